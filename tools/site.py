@@ -36,8 +36,8 @@ DRIVE, DRIVE_SUM = ROOT / "tests/golden/drive.plr", ROOT / "tests/golden/drive.s
 DRIVE_WORDS = ("--slots", "32")  # of the boards
 PICTURES = ("*.png", "*.webp")
 Known = dict[str, Sequence[str] | dict[str, str]]
-SOURCE_LINK = re.compile(r"\]\(((?:\.\./)?([\w./-]+\.(h|py)))\)")
-LANGUAGES = {"h": "c", "py": "python"}
+SOURCE_LINK = re.compile(r"\]\(((?:\.\./)?([\w./-]+\.(h|c|py)))\)")
+LANGUAGES = {"h": "c", "c": "c", "py": "python"}
 
 
 def trajectory_sum(recording: Path, words: tuple[str, ...], folder: Path) -> str:

@@ -158,7 +158,7 @@ run_ctest() {
 }
 
 check_format() {
-    find include src port tests tools -name '*.[ch]' -print0 |
+    find include src port tests tools examples -name '*.[ch]' -print0 |
         xargs -0 clang-format-14 --dry-run --Werror && echo 'every C file is formatted'
 }
 
@@ -213,11 +213,11 @@ ensure_python # there by now; if not, it says why and ends this
 
 beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
     tools/pelorus tools/firmware tools/*.py tests/python tests/layering tests/golden tests/fuzz tests/independent \
-    tests/recordings
+    tests/recordings examples
 beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
-beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
-beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
+beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests examples
+beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests examples
 if command -v clang-format-14 >/dev/null; then
     beside 'C format' check_format
 else

@@ -6,22 +6,26 @@ usage: wheels.py [--out FOLDER] [SYSTEM...]
 
 pip builds this machine's wheel; in a copy of it for each system the two libraries and the two
 replays are exchanged for those that the compiler of the package ziglang makes (cross.py), and the
-tag. Nothing of a wheel depends on the version of Python.
+tag; README gets its picture. Nothing of a wheel depends on the version of Python.
 """
 
 from __future__ import annotations
 
+import io
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from base64 import b64encode
 from pathlib import Path
 
 import amalgamate
 from cross import ROOT, X86_64_V3, Target, asked_for, build, compile_to, port_flags
+from PIL import Image
 
 NATIVE = "pelorus/native"
+PICTURE_PX = 800  # of README, in the wheel
 WHEELS = {
     "manylinux_2_17_x86_64": Target("x86_64-linux-gnu.2.17", X86_64_V3),
     "manylinux_2_17_aarch64": Target("aarch64-linux-gnu.2.17"),
@@ -54,7 +58,7 @@ def pip_wheel(folder: Path) -> Path:
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
     command += ["--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)]
     subprocess.run(command, check=True)
-    (made,) = folder.glob("pelorus-*.whl")
+    (made,) = folder.glob("pelorus_slam-*.whl")
     return made
 
 
@@ -62,6 +66,25 @@ def run_wheel(*words: str | Path) -> None:
     """The package `wheel`: it unpacks wheels, and packs them with their list of contents."""
     command = [sys.executable, "-m", "wheel", *map(str, words)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def standalone(readme: str) -> str:
+    """The README away from its checkout: its pictures are in it, small and at rest; a link to
+    another file is its words alone.
+    """
+
+    def packed(picture: re.Match[str]) -> str:
+        moving = Image.open(ROOT / picture[2])
+        moving.seek(getattr(moving, "n_frames", 1) - 1)
+        last = moving.convert("RGB")
+        last.thumbnail((PICTURE_PX, PICTURE_PX))
+        made = io.BytesIO()
+        last.save(made, "WEBP", quality=50)
+        return f"![{picture[1]}](data:image/webp;base64,{b64encode(made.getvalue()).decode()})"
+
+    elsewhere = r"(?!https?:|data:)"
+    readme = re.sub(rf"!\[([^]]*)\]\({elsewhere}([^)]+)\)", packed, readme)
+    return re.sub(rf"(?<!!)\[([^]]*)\]\({elsewhere}[^)]+\)", r"\1", readme)
 
 
 def make(tag: str, target: Target, own: Path, work: Path, out: Path) -> Path:
@@ -78,8 +101,10 @@ def make(tag: str, target: Target, own: Path, work: Path, out: Path) -> Path:
     (about,) = content.glob("*.dist-info/WHEEL")
     text = re.sub(r"^Tag: .*$", f"Tag: py3-none-{tag}", about.read_text(), flags=re.M)
     about.write_text(text)
+    (metadata,) = content.glob("*.dist-info/METADATA")
+    metadata.write_text(standalone(metadata.read_text("utf-8")), "utf-8")
     run_wheel("pack", content, "--dest-dir", out)
-    (made,) = out.glob(f"pelorus-*-py3-none-{tag}.whl")
+    (made,) = out.glob(f"pelorus_slam-*-py3-none-{tag}.whl")
     return made
 
 

@@ -103,11 +103,11 @@ def own_wheel(once: Once) -> Path:
             folder,
         )
         for words in (("-c", source), (*build, *options)):
-            command = [sys.executable, *words, *folder.glob("pelorus-*.tar.gz")]
+            command = [sys.executable, *words, *folder.glob("pelorus_slam-*.tar.gz")]
             done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
             assert done.returncode == 0, done.stderr
 
-    (wheel,) = once("own-wheel", make).glob("pelorus-*.whl")
+    (wheel,) = once("own-wheel", make).glob("pelorus_slam-*.whl")
     return wheel
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from converted import Run
-from pelorus import wire
+from pelorus import inertial, wire
 from pelorus.check import (
     clock,
     outcome,
@@ -28,7 +28,19 @@ from pelorus.check.contents import first_frames, half, recording_of, shifted, wr
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Imu, Kind, Message, Noise, Report, Start, Stereo, Twist
+from pelorus.frames import (
+    Header,
+    Imu,
+    Kind,
+    Message,
+    Noise,
+    Reading,
+    Report,
+    Start,
+    Stereo,
+    Twist,
+)
+from pelorus.inertial import Inertial
 from pelorus.tracks import Tracks
 from replay_drive import BIN, CAMERA, drive, header
 from report_runs import built_programs
@@ -191,6 +203,25 @@ def test_a_batch_of_readings_does_not_reach_over_a_frame_that_was_moved(flown: P
     given = [t for m in wire.messages_of(flown) if isinstance(m, Imu) for t in m.times_ns]
     kept = [t for m in messages if isinstance(m, Imu) for t in m.times_ns]
     assert kept == given[: len(kept)]
+
+
+def test_moved_frames_leave_readings_beside_an_imu_in_their_place() -> None:
+    """None is later than what stands before it, and of one time the IMU's stands first."""
+    t_ns = np.arange(200) * 5 * MS
+    rows = np.tile([0.0, 0, 9.81], (len(t_ns), 1))
+    wheel = [Reading(int(t), 1, 1, sigma=np.full(3, 0.1)) for t in t_ns[::4]]
+    wheel += [replace(m, t_ns=m.t_ns + 7 * MS) for m in wheel]
+    pixels = np.zeros((1, 4), np.float32)
+    frames = [Stereo(100 * k * MS, np.zeros(1, np.uint32), pixels) for k in range(1, 10)]
+    batches = [m for _, m in inertial.messages(Inertial(t_ns, rows, 0 * rows), np.empty(0, int))]
+    ranks = {Imu: 0, Reading: 1, Stereo: 2}
+    last, held = (0, 0), 0
+    for message in shifted([header(), *batches, *wheel, *frames], 33 * MS)[1:]:
+        assert isinstance(message, Imu | Reading | Stereo)
+        assert last <= (message.t_ns, ranks[type(message)]), message
+        last = (message.times_ns[-1] if isinstance(message, Imu) else message.t_ns), 0
+        held += isinstance(message, Reading)
+    assert held == len(wheel)
 
 
 def test_the_foot_of_a_parabola_and_how_sure_it_is() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
 import shutil
 import subprocess
@@ -15,13 +16,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from pelorus import Calibration, Filter, FilterError, KnownLandmark, PelorusError, native
+from pelorus import Calibration, Filter, FilterError, KnownLandmark, PelorusError, Reason, native
 from pelorus import observations as frame_of
 from pelorus.cli import main
 from pelorus.frames import Camera, Config, Header, Message, Noise, Pose, Stereo, Truth, Twist
 from pelorus.layout import Floats
 from pelorus.native import Precision
-from pelorus.schema import DEFAULTS, SETTINGS
+from pelorus.schema import DEFAULTS, REASON_NAMES, REASONS, SETTINGS
 from pelorus.settings import IDS
 from pelorus.wire import messages_of, write_file
 from replay_drive import BIN
@@ -165,10 +166,11 @@ def test_the_structs_are_those_of_the_headers(tmp_path: Path) -> None:
     lines = []
     expected = []
     for struct in native.STRUCTS:
+        plain = type("Plain", (ctypes.Structure,), {"_fields_": struct._fields_})
         for field in struct._fields_:
             member = members.get(field[0], field[0]) if struct is native.Twist else field[0]
             lines.append(f'printf("%zu\\n", offsetof({struct.c_name}, {member}));')
-            expected.append(getattr(struct, field[0]).offset)
+            expected.append(getattr(plain, field[0]).offset)
     source = tmp_path / "offsets.c"
     source.write_text(
         '#include <stddef.h>\n#include <stdio.h>\n#include "pelorus/pelorus.h"\n'
@@ -197,10 +199,12 @@ REFUSED: tuple[tuple[str, Callable[[Filter], Any]], ...] = (
     (r"pixels: .* \(2, 3\); numbers .* \(2, 4\)", lambda _: frame_of([1, 2], np.ones((2, 3)))),
     (r"ids: -1 to 4; 0 to 4294967295", lambda _: frame_of([4, -1], np.ones((2, 4)))),
     (r"ids: float64 of shape", lambda _: frame_of([4.5, 1.0], np.ones((2, 4)))),
+    (r"ids: float64 of shape", lambda _: frame_of([4.0, np.nan], np.ones((2, 4)))),
+    (r"ids: <U1 of shape", lambda _: frame_of(["4", "5"], np.ones((2, 4)))),
     (r"sensor 'sonar': one of wheel", lambda f: f.measure(7, "sonar", [0, 0, 0], [1, 1, 1])),
     (r"set_pose: ", lambda f: f.set_pose(7, 2 * np.eye(3), [0, 0, 0])),
     (r"covariance: .*\(3, 3\); numbers .* \(6, 6\)", lambda f: f.set_pose(7, EYE, ZEROS, EYE)),
-    (r"inertial: .*mode", lambda f: f.inertial(7, [0, 0, 9.8], [0, 0, 0])),
+    (r'inertial: .*"twist"}: give readings to predict$', lambda f: f.inertial(7, ZEROS, ZEROS)),
     (r"supervision: ", lambda f: f.supervision()),
 )  # fmt: skip
 
@@ -219,7 +223,9 @@ def test_a_wrong_argument_is_named_and_changes_nothing(
 
 
 CONFIGS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("no setting pixel-sigmas; there are .*pixel-sigma,", {"pixel-sigmas": 2}),
+    ("no setting pixel-sigmas: is pixel-sigma .*meant.; there are .*slots", {"pixel-sigmas": 2}),
+    ("no setting gyro_noise: is gyro-noise .*meant.;", {"gyro_noise": 2}),
+    ("no setting colour; there are", {"colour": 2}),
     ("pixel-sigma 0: 0.001 to 1000 px are possible", {"pixel-sigma": 0}),
     ("slots 257: 1 to 256 are possible", {"slots": 257}),
     ("scene 'stays': one of stands, may-move", {"scene": "stays"}),
@@ -283,6 +289,53 @@ def test_a_library_of_other_structs_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(native.Report, "c_name", "plr_frame")
     with pytest.raises(PelorusError, match=r"with another plr_frame.*build it anew"):
         native.Library(Path(path))
+
+
+def test_ids_of_a_table_of_floats_are_taken() -> None:
+    frame = frame_of(np.array([3.0, 2.0**32 - 1]), np.ones((2, 4)))
+    assert frame["id"].tolist() == [3, 2**32 - 1]
+
+
+def test_a_twist_for_a_filter_with_an_imu_is_sent_to_inertial() -> None:
+    filter = Filter(CAMERA, {"process": "imu"})
+    with pytest.raises(FilterError, match=r'"process": "imu"}: give readings to inertial$'):
+        filter.predict(7, ZEROS, ZEROS)
+
+
+def test_reasons_are_flags_with_names() -> None:
+    filter = Filter(CAMERA)
+    filter.predict(0, ZEROS, ZEROS)
+    report = filter.update(1, frame_of([7, 7], np.ones((2, 4))))
+    assert Reason.REFUSED_INPUT in report.reasons
+    assert Reason.FROZEN_IMAGE not in report.reasons
+    assert report.reasons & 128
+    assert "observations were malformed, or an id stood twice" in report.reasons.words
+    assert (Reason.NO_FRAMES | Reason.BUDGET).words == tuple(
+        REASONS[bit] for bit in (Reason.BUDGET, Reason.NO_FRAMES)
+    )
+    assert {reason.name: reason.value for reason in Reason} == {
+        name: bit for bit, name in REASON_NAMES.items()
+    }
+    assert (str(Reason(0)), str(Reason.NO_FRAMES)) == ("none", "NO_FRAMES")
+    assert str(Reason.NO_FRAMES | Reason.BUDGET) == "BUDGET|NO_FRAMES"
+    later = Reason(1 << 30 | 1)  # of a library of another version
+    assert Reason.FEW_OBSERVATIONS in later
+    assert later.words == (REASONS[1],)
+
+
+def test_report_health_and_filter_show_what_they_hold() -> None:
+    filter = Filter(CAMERA, {"slots": 20})
+    shown = "<pelorus.Filter float32, slam, 0 landmarks in 20 slots, at 0 ns, "
+    assert repr(filter).startswith(shown)
+    filter.predict(0, ZEROS, ZEROS)
+    told = repr(filter.update(10**8, frame_of([7, 7], np.ones((2, 4)))))
+    assert told.startswith("Report(t_ns=100000000, status=0, health=")
+    assert "REFUSED_INPUT" in told
+    assert ", observations=2, " in told
+    assert re.search(r"Health\(health=\w+, reasons=[\w|]+, seconds_without", repr(filter.health()))
+    assert repr(native.Report()).startswith("Report(t_ns=0, status=0, health=good, reasons=none, ")
+    assert "nu=[0.0, 0.0" in repr(native.Supervision())
+    assert repr(native.Setting()).startswith("Setting(id=0, name=None")
 
 
 def seen(points_C: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

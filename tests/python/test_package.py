@@ -13,8 +13,12 @@ from collections.abc import Iterable, Sequence
 from importlib.metadata import distribution
 from pathlib import Path
 
+import pelorus
 import pytest
 from packaging.requirements import Requirement
+from pelorus import __version__
+from pelorus.cli import main
+from pelorus.distribution import mixed_up
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,7 +41,7 @@ def test_without_any_extra_a_sample_comes_to_its_report(tmp_path: Path) -> None:
     assert without(EXTRAS, "simulate", "--duration", "4", drive).returncode == 0
     done = without(EXTRAS, "try", drive, "--out", str(out))
     assert (out / "report.html").is_file(), done.stderr
-    assert "pip install 'pelorus[figures]'" in done.stderr
+    assert "pip install 'pelorus-slam[figures]'" in done.stderr
     for words, files in (
         (("map", drive), {"map.pgm", "map.yaml"}),
         (("course", drive), {"table.md", "runs"}),
@@ -47,6 +51,38 @@ def test_without_any_extra_a_sample_comes_to_its_report(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         assert "drawings (.png) need matplotlib, which is missing: pip install" in done.stderr
         assert {path.name for path in folder.iterdir()} == files
+
+
+def test_somebody_elses_pelorus_beside_this_one_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert mixed_up() == ""
+    for name, number in (("pelorus", "0.0.8"), ("pelorus_cli", "0.0.7")):
+        (about := tmp_path / f"{name}-{number}.dist-info").mkdir()
+        (about / "METADATA").write_text(f"Name: {name}\nVersion: {number}\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    said = mixed_up()
+    assert said.startswith("pip has installed pelorus 0.0.8 and pelorus-cli 0.0.7 here, too")
+    assert "pip install --force-reinstall pelorus-slam" in said
+    assert main(["--version"]) == 0
+    warned = " ".join(capsys.readouterr().err.split())
+    assert "warning: pip has installed pelorus 0.0.8 and" in warned
+    monkeypatch.delattr(pelorus, "ARITHMETIC")  # as where that one was installed last
+    assert main(["--version"]) == 1
+
+
+def test_pip_puts_the_replay_on_the_path() -> None:
+    for name, function in (("pelorus-replay", "float32"), ("pelorus-replay-f64", "float64")):
+        code = f"import sys; from pelorus.replay_program import {function}; sys.exit({function}())"
+        command = [sys.executable, "-c", code, "--version"]
+        there = os.environ | {"PELORUS_BIN": str(BIN)}
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=there)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.startswith(f"{name} {__version__}")
+        nowhere = os.environ | {"PELORUS_BIN": os.devnull}
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=nowhere)
+        assert done.returncode == 1
+        assert done.stderr.startswith(f"{name}: is in none of {os.devnull}: build it")
 
 
 @pytest.mark.parametrize(
@@ -64,7 +100,7 @@ def test_what_needs_an_extra_names_it(extra: str, code: str) -> None:
         [sys.executable, "-c", f"{hidden}; from pathlib import Path; {code}"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert f"which is missing: pip install 'pelorus[{extra}]'" in done.stderr.splitlines()[-1]
+    assert f"which is missing: pip install 'pelorus-slam[{extra}]'" in done.stderr.splitlines()[-1]
     assert done.stderr.splitlines()[-1].startswith("pelorus.errors.PelorusError: ")
 
 
@@ -128,6 +164,9 @@ def test_every_command_works_from_the_wheel_alone(own_wheel: Path, tmp_path: Pat
     ):
         said("-m", "pelorus", *words.split())
     assert (away / "report/report.html").is_file()
+    (entries,) = site.glob("pelorus_slam-*.dist-info/entry_points.txt")
+    assert "pelorus-replay=pelorus.replay_program:float32" in entries.read_text().replace(" ", "")
+    said("-c", "from pelorus.replay_program import float32; float32()", "--version")
     camera = "pelorus.Calibration(400, 400, 320, 240, 0.1)"
     for precision in ("float32", "float64"):
         code = f"import pelorus; print(pelorus.Filter({camera}, precision={precision!r}).pose().p)"

@@ -16,12 +16,14 @@ from drives import PERFECT, clean
 from pelorus.frames import Reading
 from pelorus.layout import Floats
 from pelorus.recording import Recording
+from pelorus.simulation.imu import Imu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.readings import Sensing
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.small_sensors import SMALL_SENSORS, SmallSensor
 from replay_drive import ROOT, judged, run
+from test_convert_blind import imu as imu_csv
 from test_convert_csv import csv_files, write_csv
 
 ARM = (0.4, -0.3, 0.2)
@@ -333,6 +335,49 @@ def test_a_sensor_makes_the_pose_better_and_its_covariance_stays_true(
         assert NEES[0] < got[mode].nees < NEES[1], mode
         assert got[mode].used > 20 * got[mode].gated
         assert without[mode].used == 0
+
+
+def used_of_all(path: Path, waits: int = 2) -> int:
+    """How many readings are used of a drive of which nothing is late, nor refused for it."""
+    told = judged(path)
+    assert told["messages_refused"] == told["readings_refused"] == 0
+    assert told["frames_good"] >= told["frames"] - waits, "frames until the IMU has started"
+    return int(told["readings_used"])
+
+
+@pytest.mark.parametrize(
+    "sensing",
+    [
+        {"wheel": Sensing(rate_hz=50.0, sigma=(0.05,))},
+        {"position": Sensing(rate_hz=5.0)},
+        {"wheel": Sensing(rate_hz=100.0), "position": Sensing(rate_hz=20.0)},
+    ],
+    ids=["wheel", "position", "both"],
+)
+def test_no_batch_of_an_imu_reaches_beyond_a_reading_beside_it(
+    tmp_path: Path, sensing: dict[str, Sensing]
+) -> None:
+    path = tmp_path / "imu.plr"
+    options = Options(duration_s=20.0, imu=Imu(imu_rate_hz=200.0), readings=sensing)
+    simulate(options).recording.write(path)
+    assert used_of_all(path) > 0
+
+
+def test_an_imu_and_wheels_of_two_csv_files_are_both_taken(tmp_path: Path, pelorus: Run) -> None:
+    imu = Imu(imu_rate_hz=200.0, rest_s=1.5)
+    drive = simulate(Options(duration_s=20.0, imu=imu, pixel_sigma_px=0.5)).recording
+    files = csv_files(tmp_path, drive)[2:]  # all but the twists
+    files += ["--imu", imu_csv(tmp_path, drive)]
+    moving = drive.truth_velocity
+    assert moving is not None
+    t_ns = drive.truth_t_ns + 31_000_000  # neither of a frame nor of a reading of the IMU
+    begun = t_ns > 2_000_000_000  # before the filter has started it refuses them
+    t_ns, speed = t_ns[begun], moving[begun, 0]
+    wheel = {"t_ns": t_ns, "vx_mps": speed, "sigma_mps": np.full(len(t_ns), 0.3)}
+    target = tmp_path / "mine.plr"
+    options = ("--wheel", write_csv(tmp_path / "wheel.csv", wheel))
+    pelorus("convert", "csv", *files, *options, target)
+    assert used_of_all(target, waits=20) > 150
 
 
 def test_a_robot_that_says_that_it_rests_stays_where_it_is(tmp_path: Path) -> None:

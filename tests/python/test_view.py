@@ -275,7 +275,7 @@ def test_a_missing_library_is_one_sentence(
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     said = " ".join(done.stderr.split())
-    assert said == f"error: this needs {module}, which is missing: pip install 'pelorus[view]'"
+    assert said == f"error: this needs {module}, which is missing: pip install 'pelorus-slam[view]'"
     assert not list(tmp_path.iterdir())
 
 

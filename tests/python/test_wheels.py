@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+import io
 import os
+import re
 import shutil
 import subprocess
 import sys
 import zipfile
+from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from pelorus import __version__, native
+from PIL import Image
 
 pytest.importorskip("ziglang")
 pytest.importorskip("wheel")
@@ -83,6 +87,19 @@ def test_the_wheel_is_of_windows_and_of_no_python(wheel: Path, unpacked: Path) -
     inside = zipfile.ZipFile(wheel).namelist()
     assert "pelorus/cli.py" in inside
     assert not [name for name in inside if name.endswith(".so")]
+
+
+def test_the_wheels_readme_has_its_picture_and_no_link_that_leads_nowhere(unpacked: Path) -> None:
+    (metadata,) = unpacked.glob("*.dist-info/METADATA")
+    head, _, readme = metadata.read_text("utf-8").partition("\n\n")
+    assert "\nName: pelorus-slam\n" in head
+    assert "\nAuthor: Pelorus developers\n" in head
+    pictures = re.findall(r"!\[[^]]+\]\(data:image/webp;base64,([^)]+)\)", readme)
+    assert len(pictures) == 1
+    assert Image.open(io.BytesIO(b64decode(pictures[0]))).width == 800
+    links = re.findall(r"\]\(([^)]+)\)", readme)
+    assert len(links) > 4
+    assert [link for link in links if not link.startswith(("https://", "data:image/"))] == []
 
 
 @pytest.mark.skipif(not shutil.which("objdump"), reason="no objdump")

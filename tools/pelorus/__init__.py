@@ -8,11 +8,26 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 ARITHMETIC = 22  # PLR_ARITHMETIC of the library that these tools belong to
 
-__all__ = ["Calibration", "Filter", "FilterError", "KnownLandmark", "PelorusError", "observations"]
+__all__ = [
+    "Calibration",
+    "Filter",
+    "FilterError",
+    "KnownLandmark",
+    "PelorusError",
+    "Reason",
+    "observations",
+]
 
 if TYPE_CHECKING:
     from pelorus.errors import PelorusError
-    from pelorus.filter import Calibration, Filter, FilterError, KnownLandmark, observations
+    from pelorus.filter import (
+        Calibration,
+        Filter,
+        FilterError,
+        KnownLandmark,
+        Reason,
+        observations,
+    )
 
 
 def __getattr__(name: str) -> Any:

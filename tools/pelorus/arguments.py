@@ -30,6 +30,13 @@ def checked(name: str, value: ArrayLike, shape: tuple[int, ...], type: Any = np.
         return np.ascontiguousarray(array, type)
 
 
+def are_whole(array: NDArray[Any]) -> bool:
+    """Whether all of them are whole numbers, as integers or as floats."""
+    if array.dtype.kind == "f":
+        return bool(np.all(np.isfinite(array)) and np.all(array == np.floor(array)))
+    return array.dtype.kind in "iu"
+
+
 def real(name: str, value: Any) -> float:
     """One number."""
     try:

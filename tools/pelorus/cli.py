@@ -64,8 +64,15 @@ def _say_what_cannot_be_encoded() -> None:
 def _run(words: list[str]) -> int:
     from rich.markup import escape  # noqa: PLC0415 - see above
 
-    from pelorus.application import application  # noqa: PLC0415
+    import pelorus  # noqa: PLC0415
     from pelorus.console import err  # noqa: PLC0415
+    from pelorus.distribution import mixed_up  # noqa: PLC0415
+
+    if said := mixed_up():
+        err.print(f"[bold yellow]warning:[/] {escape(said)}")
+        if not hasattr(pelorus, "ARITHMETIC"):  # it has overwritten this one
+            return 1
+    from pelorus.application import application  # noqa: PLC0415
     from pelorus.errors import PelorusError, gives_up_output  # noqa: PLC0415
 
     app = application(words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
 from itertools import takewhile
 
 import numpy as np
@@ -35,7 +36,7 @@ class Configured:
         """A number, a word, words of a list between commas, or three numbers for three axes; what
         was set, by id. PelorusError, with what would be right."""
         if name not in IDS:
-            raise PelorusError(f"config: no setting {name}; there are {', '.join(sorted(IDS))}")
+            raise PelorusError(f"config: {unknown(name)}; there are {', '.join(sorted(IDS))}")
         number = _number_of(name, value)
         if isinstance(number, tuple):
             axes = zip(("", "-y", "-z"), number, strict=True)
@@ -52,7 +53,7 @@ class Configured:
     def get(self, name: str) -> float:
         """The value in force; of a choice its number."""
         if name not in IDS:
-            raise PelorusError(f"no setting {name}")
+            raise PelorusError(unknown(name))
         return float(self._c.config_get(self.memory, self._c.setting_by_name(name.encode())))
 
     def check(self) -> None:
@@ -61,6 +62,12 @@ class Configured:
         why = self._c.config_why(self.memory, c.byref(culprit))
         if why is not None:
             raise PelorusError(f"config: {culprit[0].name.decode()}: {why.decode()}")
+
+
+def unknown(name: str) -> str:
+    """That there is no such setting, and which it may have been."""
+    near = get_close_matches(name.replace("_", "-"), IDS)
+    return f"no setting {name}" + (f": is {' or '.join(near)} meant?" if near else "")
 
 
 def of_recording(

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from pelorus.distribution import pip_install
 from pelorus.errors import PelorusError
 
 __all__ = ["cv2", "extra", "figures_missing"]
@@ -26,7 +27,7 @@ EXTRAS = {
 
 def _missing(package: str) -> str:
     needs, name = EXTRAS[package]
-    return f"{needs}, which is missing: pip install 'pelorus[{name}]'"
+    return f"{needs}, which is missing: {pip_install(name)}"
 
 
 @contextmanager

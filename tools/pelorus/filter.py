@@ -26,12 +26,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pelorus import native, schema
-from pelorus.arguments import address, checked, kind_of, real, whole_number
+from pelorus.arguments import address, are_whole, checked, kind_of, real, whole_number
 from pelorus.configured import Configured, Named, of_recording
 from pelorus.errors import PelorusError
 from pelorus.frames import Message
 from pelorus.layout import unpack_symmetric
 from pelorus.native import Health, Precision, ReadingResult, Report, Supervision
+from pelorus.reason import Reason
 
 __all__ = [
     "OBSERVATION",
@@ -41,6 +42,7 @@ __all__ = [
     "Health",
     "KnownLandmark",
     "Pose",
+    "Reason",
     "Report",
     "Supervision",
     "observations",
@@ -56,6 +58,8 @@ LANDMARK = np.dtype(
     [("id", "<u4"), ("times_seen", "<u4"), ("times_gated", "<u4"), ("last_seen_ns", "<u8"),
      ("known", "?"), ("p_W_m", "<f8", 3), ("P_W_m2", "<f8", (3, 3))], align=True
 )  # fmt: skip
+OTHER_MODE = schema.number("status", "MODE")
+NO_HINT: Mapping[int, str] = {}
 NO_BUDGET = schema.LIMITS["no_budget"]
 MOST_NS = 2**64 - 1
 MOST_ID = 2**32 - 1
@@ -110,9 +114,10 @@ class Calibration:
 
 
 def observations(ids: ArrayLike, pixels: ArrayLike) -> NDArray[np.void]:
-    """Observations of a frame: ids (n,), 0 to 2^32 - 1; pixels (n, 4) of (uL, vL, uR, vR)."""
+    """Observations of a frame: ids (n,), 0 to 2^32 - 1, also as floats that are whole numbers (a
+    column of a table); pixels (n, 4) of (uL, vL, uR, vR)."""
     numbers, places = np.asarray(ids), np.asarray(pixels)
-    if numbers.ndim != 1 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
+    if numbers.ndim != 1 or (numbers.size and not are_whole(numbers)):
         raise PelorusError(f"ids: {kind_of(numbers)}; whole numbers of shape (n,) are wanted")
     if numbers.size and not (numbers.min() >= 0 and numbers.max() <= MOST_ID):
         raise PelorusError(f"ids: {numbers.min()} to {numbers.max()}; 0 to {MOST_ID} are possible")
@@ -199,6 +204,14 @@ class Filter:
         camera = Calibration.of_header(header)
         return cls(camera, settings, precision=precision, known=given)
 
+    def __repr__(self) -> str:
+        slots, mode = int(self.setting("slots")), schema.word_of("mode", self.setting("mode"))
+        health = schema.HEALTHS[self.health().health]
+        return (
+            f"<pelorus.Filter {self.precision}, {mode}, {len(self.landmarks())} landmarks in "
+            f"{slots} slots, at {self.time_ns} ns, {health}>"
+        )
+
     def setting(self, name: str) -> float:
         """The value in force; of a choice its number."""
         return self._config.get(name)
@@ -219,9 +232,14 @@ class Filter:
 
     # --- calls
 
-    def _checked(self, call: str, status: int) -> None:
+    def _checked(self, call: str, status: int, hint: Mapping[int, str] = NO_HINT) -> None:
         if status != 0:
-            raise FilterError(call, status, self._c.text(status))
+            raise FilterError(call, status, self._c.text(status) + hint.get(status, ""))
+
+    def _other_process(self, call: str) -> str:
+        """What to say where a reading is of the other process, whose readings `call` takes."""
+        process = schema.word_of("process", self.setting("process"))
+        return f'; this filter was made with {{"process": "{process}"}}: give readings to {call}'
 
     def reset(self) -> None:
         """As after the beginning, all counts zero."""
@@ -260,7 +278,7 @@ class Filter:
         self._angular[:] = checked("w_B_radps", w_B_radps, (3,))
         status = self._predict(self._f, whole_number("t_ns", t_ns, MOST_NS), self._twist_at)
         if status != 0:
-            self._checked("predict", status)
+            self._checked("predict", status, hint={OTHER_MODE: self._other_process("inertial")})
 
     def inertial(self, t_ns: int, a_B_mps2: ArrayLike, w_B_radps: ArrayLike) -> None:
         """A reading of an IMU at t_ns: specific force (3,), m/s^2, at rest upwards; rate (3,)."""
@@ -268,7 +286,7 @@ class Filter:
         self._angular[:] = checked("w_B_radps", w_B_radps, (3,))
         status = self._inertial(self._f, whole_number("t_ns", t_ns, MOST_NS), self._twist_at)
         if status != 0:
-            self._checked("inertial", status)
+            self._checked("inertial", status, hint={OTHER_MODE: self._other_process("predict")})
 
     def update(self, t_ns: int, observations: NDArray[np.void], budget: int = NO_BUDGET) -> Report:
         """A stereo frame: what `observations` makes, (n,) of OBSERVATION, read without a copy. At

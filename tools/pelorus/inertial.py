@@ -132,8 +132,9 @@ def messages(
 ) -> Iterator[tuple[int, Imu]]:
     """As IMU frames of up to `most` readings, each with the time of its last one.
 
-    No batch has readings on both sides of a cut (a frame, which must find all before it), and in
-    none a stamp is off by more than STAMP_TOLERANCE_NS.
+    No batch has readings on both sides of a cut, and in none a stamp is off by more than
+    STAMP_TOLERANCE_NS. Cuts are the times, in order, of all that the filter takes besides: frames
+    and readings of small sensors. A batch that reaches beyond one makes it late.
     """
     side = np.searchsorted(cuts_ns, readings.t_ns, side="left")
     begin, count = 0, len(readings.t_ns)

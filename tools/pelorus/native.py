@@ -12,18 +12,21 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 
-from pelorus import __version__
+from pelorus import __version__, distribution, schema
 from pelorus.errors import PelorusError
+from pelorus.reason import Reason
 
 Precision = Literal["float32", "float64"]
+S = TypeVar("S", bound=c.Structure)
 
 PACKAGED = Path(__file__).resolve().parent / "native"  # of a wheel
 BUILT = Path("build/bin")  # of a checkout
 SOURCE_ROOT = Path(__file__).resolve().parents[2]
 NAMES: dict[Precision, str] = {"float32": "pelorus-filter", "float64": "pelorus-filter-f64"}
 SUFFIXES = {"win32": ".dll", "darwin": ".dylib"}
+EXE = ".exe" if sys.platform == "win32" else ""  # how a program's name ends
 REJECTED = 24  # PLR_SUPERVISION_REJECTED
 
 
@@ -39,6 +42,29 @@ class _Struct(c.Structure):
     """One of include/pelorus; its `_fields_` are the header's, in their order."""
 
     c_name: ClassVar[str]
+
+    def __repr__(self) -> str:
+        names = (field[0] for field in self._fields_)
+        told = (f"{name}={_told(name, getattr(self, name))}" for name in names)
+        return f"{type(self).__name__}({', '.join(told)})"
+
+
+def _told(name: str, value: Any) -> str:
+    """A member, as a struct shows itself."""
+    if name == "health":
+        return schema.HEALTHS.get(value, str(value))
+    if isinstance(value, Reason):
+        return str(value)
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return repr(list(value)) if isinstance(value, c.Array) else repr(value)
+
+
+def _with_reasons(struct: type[S]) -> type[S]:
+    """The class, with `reasons` a Reason; the library's number stays where it is."""
+    bits: Any = vars(struct)["reasons"]
+    setattr(struct, "reasons", property(lambda own: Reason(bits.__get__(own))))  # noqa: B010
+    return struct
 
 
 def _doubles(n: int) -> type[c.Array[c.c_double]]:
@@ -140,15 +166,16 @@ class ReadingResult(_Struct):
     _fields_ = (("status", c.c_int), ("used", c.c_bool), ("d2", c.c_double))
 
 
+@_with_reasons
 class Report(_Struct):
     """What happened to one stereo frame: plr_report of include/pelorus/types.h, where each number
-    is explained."""
+    is explained. Its reasons are flags: `Reason.FROZEN_IMAGE in report.reasons`."""
 
     c_name = "plr_report"
     t_ns: int
     status: int
     health: int
-    reasons: int
+    reasons: Reason
     budget: int
     observations: int
     matched: int
@@ -266,13 +293,14 @@ class Supervision(_Struct):
     )
 
 
+@_with_reasons
 class Health(_Struct):
     """How far the estimate may be trusted at some time, and why. Seconds since what never happened
     are infinite."""
 
     c_name = "plr_health_state"
     health: int
-    reasons: int
+    reasons: Reason
     seconds_without_frame: float
     seconds_without_use: float
     seconds_without_twist: float
@@ -425,8 +453,8 @@ class Library:
         if lacks := self._library.plr_binding_processor_lacks():
             raise PelorusError(
                 f"{path}: this processor lacks {lacks.decode()}, which the library was built for; "
-                "pip install --no-binary pelorus -C cmake.define.PLR_PORTABLE=ON pelorus "
-                "builds one for any processor: slower, the same bits"
+                f"pip install --no-binary {distribution.NAME} -C cmake.define.PLR_PORTABLE=ON "
+                f"{distribution.NAME} builds one for any processor: slower, the same bits"
             )
         self._check(path)
         self.sizes = Sizes()
@@ -456,7 +484,7 @@ class Library:
             what = f", with another {', '.join(differ)}" if differ else ""
             raise PelorusError(
                 f"{path}: is of Pelorus {version}{what}, and these tools are {__version__}: "
-                "build it anew, or install both together"
+                f"build it anew, or install both together. {distribution.mixed_up()}".rstrip()
             )
 
     def size_of(self, name: str) -> int:
@@ -487,6 +515,6 @@ def library(precision: Precision = "float32") -> Library:
     where = ", ".join(str(path.parent) for path in _candidates(precision))
     raise PelorusError(
         f"the library {next(_candidates(precision)).name} is in none of {where}: this package was "
-        "installed without it, or for another system; pip install --force-reinstall pelorus, "
-        "or build it and name its folder in PELORUS_BIN"
+        "installed without it, or for another system; pip install --force-reinstall "
+        f"{distribution.NAME}, or build it and name its folder in PELORUS_BIN"
     )

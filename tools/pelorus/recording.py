@@ -130,7 +130,9 @@ class Recording:
 
     def _imu(self) -> Iterator[tuple[int, int, Message]]:
         """A message stands where its last reading was taken."""
-        for t, message in inertial.messages(self.inertial, self.frame_t_ns, self.imu_batch):
+        small = np.array([reading.t_ns for reading in self.readings], np.int64)
+        cuts = np.union1d(self.frame_t_ns, small)
+        for t, message in inertial.messages(self.inertial, cuts, self.imu_batch):
             yield t + self.twist_delay_ns, 0, message
 
     def _small(self) -> Iterator[tuple[int, int, Message]]:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -20,7 +19,6 @@ from pelorus.errors import PelorusError, write_text, writing
 from pelorus.frames import Kind, Message, Pose, Report
 from pelorus.wire import Writer, counted_messages_of, messages_of
 
-EXE = ".exe" if os.name == "nt" else ""
 SETTINGS_MAX_DEPTH = "max-depth"
 
 
@@ -37,7 +35,7 @@ def find_programs(folder: Path | None) -> Programs:
     candidates = native.folders(folder)
     for candidate in candidates:
         programs = Programs(
-            candidate / f"pelorus-replay{EXE}", candidate / f"pelorus-replay-f64{EXE}"
+            candidate / f"pelorus-replay{native.EXE}", candidate / f"pelorus-replay-f64{native.EXE}"
         )
         if programs.float32.is_file() and programs.float64.is_file():
             return programs

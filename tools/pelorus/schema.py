@@ -91,6 +91,12 @@ def number(of: str, name: str) -> int:
     )
 
 
+def word_of(setting: str, value: float) -> str:
+    """The word of a choice's value: word_of("process", 1) is "imu"."""
+    row = next(row for row in SETTINGS.values() if row.name == setting)
+    return row.words[int(value)]
+
+
 def kind(name: str) -> int:
     """The number of a kind of message."""
     return MESSAGES[name].kind

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pelorus.frames import Config, Message
-from pelorus.schema import SETTINGS, Setting
+from pelorus.schema import SETTINGS, Setting, word_of
 
 __all__ = [
     "CALIBRATION_SIGMAS",
@@ -52,4 +52,4 @@ def in_force(messages: Sequence[Message], name: str) -> float | None:
 def mode_in_force(messages: Sequence[Message]) -> str:
     """slam, mapping, localization or dead_reckoning; empty if the result does not say."""
     mode = in_force(messages, "mode")
-    return "" if mode is None else SETTINGS[IDS["mode"]].words[int(mode)]
+    return "" if mode is None else word_of("mode", mode)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pelorus import wire
-from pelorus.check import verdict
+from pelorus.check import verdict, wheels
 from pelorus.check.calibration import calibration
 from pelorus.check.estimated import estimated, without_clock
 from pelorus.check.halves_alike import with_halves_alike
@@ -107,6 +107,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if judged.agreed is not None:
         words = f"{known_words(judged.agreed)}; {CANNOT}"
         remarks.append(Remark(Grade.GOOD, words))
+    if bench.by_imu:
+        remarks += wheels.remarks(program, messages, tuned.settings)
     grade = verdict.overall(remarks)
     lines = tuple(verdict.lines(given, bench.header, tuned, bench.by_imu))
     return Checked(grade, remarks, spells, changed, [cost, *rows], tuned, camera.share, lines)

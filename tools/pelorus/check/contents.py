@@ -110,12 +110,12 @@ def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
         if isinstance(message, Stereo):
             moved = message.t_ns + offset_ns
             if moved >= 0:  # before time zero there is nothing to see it by
-                data.append((moved, 1, replace(message, t_ns=moved)))
+                data.append((moved, 2, replace(message, t_ns=moved)))
         elif isinstance(message, Twist | Reading):
-            data.append((message.t_ns, 0, message))
+            data.append((message.t_ns, isinstance(message, Reading), message))
     readings = [m for m in messages if isinstance(m, Imu)]
-    if readings:  # a batch may not reach over a frame
-        cuts = np.array([t for t, kind, _ in data if kind == 1], np.int64)
+    if readings:
+        cuts = np.unique([t for t, _, _ in data]).astype(np.int64)
         data += [(t, 0, m) for t, m in inertial.messages(_in_order(readings), cuts)]
     return [*ahead, *(m for _, _, m in sorted(data, key=lambda row: row[:2]))]
 

@@ -23,6 +23,7 @@ from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
 from pelorus.converters.ros_motion import Moving, Wheels
+from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
@@ -185,11 +186,38 @@ def _ros(
         help="Or: the raw readings of an IMU move the body; or those of an accelerometer, with the "
         "gyro on another topic.",
     ),
-    joint_topic: str = typer.Option("", help="Or: JointState with the speeds of wheels, rad/s."),
+    joint_topic: str = typer.Option(
+        "",
+        help="Or: JointState with the speeds of wheels, rad/s. With --imu-topic they are readings "
+        "beside it.",
+    ),
     joints: list[str] = typer.Option([], "--joint", help="A wheel's joint, left ones first."),
     wheel_radius: float = typer.Option(0.0, metavar="M", help="Of the wheels of --joint."),
     track_width: float = typer.Option(
-        0.0, metavar="M", help="Between the first and the last --joint: then they tell turns too."
+        0.0,
+        metavar="M",
+        help="Between the first and the last --joint, or the wheels of --wheel-topic: then they "
+        "tell turns too.",
+    ),
+    wheel_topic: str = typer.Option(
+        "",
+        help="Beside an IMU: Odometry, TwistStamped or TwistWithCovarianceStamped of wheels, as "
+        "readings of their speed.",
+    ),
+    wheel_axes: str = typer.Option(
+        "x", metavar="LETTERS", help="Axes of their frame that they measure; xy where all steer."
+    ),
+    wheel_sigma: float = typer.Option(
+        0.0, metavar="M/S", help="Of each axis of it; else as the messages say."
+    ),
+    wheel_slide: float = typer.Option(
+        0.0,
+        metavar="M/S",
+        help="The body neither slides nor rises by more than this sigma: 0 along the axes that the "
+        "wheels do not measure is a reading, too.",
+    ),
+    wheel_standstill: bool = typer.Option(
+        True, help="Where the wheels read 0 for a second the body stands."
     ),
     truth_topic: str = typer.Option(
         "", help="Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped."
@@ -211,6 +239,12 @@ def _ros(
     until: float = typer.Option(math.inf, metavar="S", help="Likewise, what arrived later."),
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
+    joints_alone = _wheels(joint_topic, joints, wheel_radius, track_width)
+    beside = None
+    if wheel_topic or (joints_alone and imu_topic):
+        _require_imu(wheel_topic, twist_topic, joint_topic)
+        told = (wheel_sigma, wheel_axes, track_width, wheel_standstill, wheel_slide)
+        beside, joints_alone = Beside(wheel_topic, joints_alone, *told), None
     topics = ros.Topics(
         Cameras(
             left_topic,
@@ -225,15 +259,28 @@ def _ros(
             twist_topic,
             gyro_topic,
             imu_topic,
-            _wheels(joint_topic, joints, wheel_radius, track_width),
+            joints_alone,
             body_frame,
             truth_topic,
+            beside is not None,
         ),
         position_topic,
         position_sigma,
+        beside,
     )
     with Bag(source, stamps.value, (begin, until)) as opened:
         _convert(ros.read(opened, topics, asked), asked, target)
+
+
+def _require_imu(wheel_topic: str, twist_topic: str, joint_topic: str) -> None:
+    """PelorusError where another topic than an IMU's would move the body, beside wheels."""
+    if wheel_topic and joint_topic:
+        raise PelorusError("--wheel-topic and --joint-topic: both are wheels, one of them is due")
+    if twist_topic:
+        raise PelorusError(
+            "--twist-topic moves the body in place of an IMU, and wheels go beside an IMU: leave "
+            "it out, and say --wheel-topic"
+        )
 
 
 def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> Wheels | None:

@@ -42,8 +42,8 @@ def view(
 
     Pose with its three-sigma ellipsoid, way, truth, landmarks with theirs, points in the picture
     with those that were rejected, health and why, innovations, biases, what the supervisor saw,
-    computing time. It needs `pip install 'pelorus[view]'`. While a robot drives, `pelorus stream
-    --view` shows the same.
+    computing time. It needs `pip install 'pelorus-slam[view]'`. While a robot drives, `pelorus
+    stream --view` shows the same.
     """
     if not (rrd or mcap or spawn or connect):
         where = "--rrd / --mcap / --spawn / --connect"

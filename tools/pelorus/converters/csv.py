@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import foreign, trajectory
-from pelorus.converters import readings_csv, streams, twist_axes
+from pelorus.converters import readings_csv, streams, twist_axes, wheels
 from pelorus.converters.columns import Columns, example
 from pelorus.converters.streams import Readings, Seen, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
@@ -103,6 +103,8 @@ def read(
     motion = motion_of(sources.motion, columns, timing)
     truth = None if sources.truth is None else truth_of(sources.truth, columns)
     small = _readings(readings, motion, columns)
+    if isinstance(motion, Readings) and not readings.get(wheels.STANDSTILL.name):
+        small += wheels.standing(small, columns.remarks)
     if sources.stereo is None:
         frames = _blind(motion, small, columns.remarks)
     else:

@@ -6,10 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from pelorus import se3
-from pelorus.converters import ros_frames, ros_motion, ros_positions
+from pelorus.converters import ros_frames, ros_motion, ros_positions, ros_wheels
 from pelorus.converters.bag import Bag
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
 from pelorus.converters.ros_motion import IMU, Moving
+from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Readings, Streams, Twists
 from pelorus.converters.transforms import TF, Chain, Tree, bare
 from pelorus.errors import PelorusError
@@ -26,6 +27,7 @@ class Topics:
     moving: Moving = field(default_factory=Moving)
     position: str = ""  # of a GNSS receiver
     position_sigma_m: float = 0.0  # 0: as its messages say
+    wheels: Beside | None = None  # of an IMU's recording
 
 
 def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
@@ -38,14 +40,18 @@ def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
         remarks.append(f"left pictures are {cameras.left}, right ones {cameras.right}")
     frames = ros_frames.read(bag, cameras, calibrated, remarks)
     small = []
+    body = bare(topics.moving.frame) or motion.frame
+    if topics.wheels is not None:
+        if isinstance(motion, Twists):
+            raise PelorusError("--twists moves the body, and --wheel-topic goes beside an IMU")
+        small += ros_wheels.read(bag, topics.wheels, body, tree, remarks)
     if topics.position:
-        body = bare(topics.moving.frame) or motion.frame
         known = topics.position, topics.position_sigma_m
-        small = ros_positions.read(bag, *known, body, tree, remarks)
+        small += ros_positions.read(bag, *known, body, tree, remarks)
     truth = asked.truth
     if truth is None and topics.moving.truth:
         truth = ros_motion.truth(bag, topics.moving.truth, remarks)
-    return Streams(calibrated, frames, motion, truth, small, remarks, bool(small))
+    return Streams(calibrated, frames, motion, truth, small, remarks, bool(topics.position))
 
 
 # --- cameras --------------------------------------------------------------------------------------

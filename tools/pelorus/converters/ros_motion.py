@@ -67,6 +67,7 @@ class Moving:
     wheels: Wheels | None = None
     frame: str = ""  # of the body, in place of what the messages say
     truth: str = ""  # moves nothing, unless it is named twice
+    by_imu: bool = False  # twists and wheels are beside it
 
 
 class Rows(NamedTuple):
@@ -118,10 +119,11 @@ def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists
             "--twist-topic, --imu-topic and --joint-topic: one of them is due, it moves the body"
         )
     if topics.wheels is not None:
-        return _wheels(bag, topics.wheels, remarks)
+        return of_joints(bag, topics.wheels, remarks)
     if topics.imu:
         return _imu(bag, topics.imu, topics.gyro, remarks)
     twists = [topic for topic in bag.of_type(*TWISTS) if topic != topics.truth]
+    twists = [] if topics.by_imu else twists
     imus = bag.of_type(IMU)
     if topics.twist or len(twists) == 1:
         unused = [topic for topic in imus if topic != topics.gyro]
@@ -149,7 +151,7 @@ def _twists(bag: Bag, topic: str, asked: Asked, remarks: list[str]) -> Twists:
 
     def row(message: Any) -> list[float]:
         twist = of_twist(message)
-        numbers = np.array([*_xyz(twist.linear), *_xyz(twist.angular)])
+        numbers = np.array([*xyz(twist.linear), *xyz(twist.angular)])
         pose = [] if of_pose is None else _pose(of_pose(message))
         pose = pose if np.isfinite(pose).all() else NO_POSE
         return [*np.where(kept, numbers, 0.0).tolist(), *pose]
@@ -166,7 +168,7 @@ def _twists(bag: Bag, topic: str, asked: Asked, remarks: list[str]) -> Twists:
     return twist_axes.in_body(found, poses, asked.axes, _timing(asked), remarks)
 
 
-def _wheels(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
+def of_joints(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
     """Forward the mean of the wheels' speeds; nothing else, unless the track width gives a turn."""
     topic = bag.require(wheels.topic, JOINTS)
 
@@ -255,8 +257,8 @@ def _halves(bag: Bag, topic: str, remarks: list[str]) -> Rows:
 
     def row(message: Any) -> list[float]:
         if hasattr(message, "vector"):
-            return [*_xyz(message.vector), *_xyz(message.vector)]
-        return [*_xyz(message.linear_acceleration), *_xyz(message.angular_velocity)]
+            return [*xyz(message.vector), *xyz(message.vector)]
+        return [*xyz(message.linear_acceleration), *xyz(message.angular_velocity)]
 
     return rows_of(bag, topic, row, remarks)
 
@@ -282,7 +284,7 @@ def truth(bag: Bag, topic: str, remarks: list[str]) -> Trajectory:
 def _pose(pose: tuple[Any, Any]) -> list[float]:
     """p and q, x y z w."""
     p, q = pose
-    return [*_xyz(p), *_xyz(q), float(q.w)]
+    return [*xyz(p), *xyz(q), float(q.w)]
 
 
 def _poses(numbers: Floats) -> Poses:
@@ -297,7 +299,8 @@ def _are_rotations(quaternions: Floats) -> bool:
 # --- rows -----------------------------------------------------------------------------------------
 
 
-def _xyz(vector: Any) -> list[float]:
+def xyz(vector: Any) -> list[float]:
+    """Three numbers of a message."""
     return [float(vector.x), float(vector.y), float(vector.z)]
 
 

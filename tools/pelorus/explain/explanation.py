@@ -17,6 +17,7 @@ from pelorus.explain.finding import Cause, Finding, S
 from pelorus.explain.inputs import of_inputs, rejected
 from pelorus.explain.log import FEW, Flags, Log, log_of
 from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
+from pelorus.explain.small import of_small
 from pelorus.explain.stamps import of_stamps
 from pelorus.frames import Kind, Message
 from pelorus.health import LOST, Spell, TimeLine, time_line
@@ -174,7 +175,8 @@ def explain(messages: Sequence[Message]) -> Explanation:
     health = time_line(messages)
     assert health is not None  # log_of has refused a log without answers
     inputs = [*of_stamps(log), *of_inputs(log)]
-    found = sorted((*inputs, *(_behind(one, inputs) for one in contradictions(log))), key=_order)
+    odd = (*of_small(log, messages), *(_behind(one, inputs) for one in contradictions(log)))
+    found = sorted((*inputs, *odd), key=_order)
     begin = found[0].from_ns if found else None
     calm = _calm(log, begin)
     setup = tuple(of_setup(log, calm))

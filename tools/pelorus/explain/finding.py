@@ -20,6 +20,7 @@ class Cause(StrEnum):
     DEAD_ODOMETRY = "dead-odometry"
     DEAD_GYRO = "dead-gyro"
     DEAD_ACCELEROMETER = "dead-accelerometer"
+    READINGS_OFF = "readings-off"
     LOST_TRACKS = "lost-tracks"
     JUMP = "jump"
     SLIP = "slip"
@@ -61,6 +62,8 @@ REMEDIES = {
     Cause.DEAD_ODOMETRY: "look at the encoders, their cables and driver",
     Cause.DEAD_GYRO: "look at the gyro's bus and driver",
     Cause.DEAD_ACCELEROMETER: "look at the accelerometer's bus and driver",
+    Cause.READINGS_OFF: "nothing, where wheels slip; else look at the sensor's scale, place and "
+    "sigma (`pelorus check` measures wheels beside an IMU)",
     Cause.LOST_TRACKS: "look at light, exposure and what was before the camera; a front end that "
     "begins anew keeps no ids",
     Cause.JUMP: "nothing, where the robot was pushed or carried; else look at the stamps there",

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import schema
+from pelorus.distribution import pip_install
 from pelorus.ellipsoids import Ellipsoids, of_landmarks
 from pelorus.errors import PelorusError
 from pelorus.evaluation import assess, by_imu, on_its_clock
@@ -36,7 +37,7 @@ def extra(module: str) -> Any:
         return import_module(module)
     except ImportError as error:
         raise PelorusError(
-            f"this needs {module.partition('.')[0]}, which is missing: pip install 'pelorus[view]'"
+            f"this needs {module.partition('.')[0]}, which is missing: {pip_install('view')}"
         ) from error
 
 

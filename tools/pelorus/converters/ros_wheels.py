@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""A bag's wheels beside its IMU: odometry, twists or the speeds of joints as readings of the small
+sensor `wheel`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pelorus.converters import wheels
+from pelorus.converters.bag import Bag
+from pelorus.converters.ros_motion import TWISTS, Wheels, of_joints, rows_of, xyz
+from pelorus.converters.streams import BLIND_VELOCITY_MPS
+from pelorus.converters.transforms import Tree
+from pelorus.converters.wheels import WHEEL, Rolling
+from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import Reading
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
+
+SIGMA_MAX_MPS = 10.0  # beyond it a covariance says "not measured"
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Which wheels: a topic of twists, or joints. With a track width two of them are told apart."""
+
+    topic: str = ""
+    joints: Wheels | None = None
+    sigma_mps: float = 0.0  # 0: as the messages say
+    letters: str = "x"  # of the axes that they measure
+    track_m: float = 0.0
+    stand: bool = True  # where they read 0, the body stands
+    slide_mps: float = 0.0  # they slide and rise no more than that, as a sigma; 0: nobody says
+
+    def check(self) -> None:
+        """PelorusError where it makes no sense."""
+        if not self.letters or set(self.letters) - set(WHEEL.letters):
+            raise PelorusError(
+                f"--wheel-axes is {self.letters}: some of the letters {WHEEL.letters} are due"
+            )
+        for option, sigma in (("sigma", self.sigma_mps), ("slide", self.slide_mps)):
+            if not 0 <= sigma <= SIGMA_MAX_MPS:
+                raise PelorusError(f"--wheel-{option} is {sigma:g}: more than 0 m/s is due")
+        if self.track_m and "x" not in self.letters:
+            raise PelorusError("--track-width: left and right wheel need x in --wheel-axes")
+
+
+def read(bag: Bag, beside: Beside, body: str, tree: Tree, remarks: list[str]) -> list[Reading]:
+    """Returns their readings; where they sit on the body, the transforms say."""
+    beside.check()
+    if beside.joints is None:
+        rolling, turn_radps, frame = _of_topic(bag, beside, remarks)
+        topic = beside.topic
+    else:
+        topic = beside.joints.topic
+        found = of_joints(bag, beside.joints, remarks)
+        sigma = np.full_like(found.v_B_mps, _sigma_wanted(bag, topic, beside))
+        rolling = Rolling(found.t_ns, found.v_B_mps, sigma, "x")
+        turn_radps, frame = found.w_B_radps[:, 2], found.frame
+    T_BW = _seat(topic, frame, body, tree, remarks)
+    readings: list[Reading] = []
+    half = 0.5 * beside.track_m
+    for side in (half, -half) if half else (0.0,):  # left, right
+        v_W = rolling.v_W_mps.copy()
+        v_W[:, 0] -= side * turn_radps
+        at_W = np.array([0.0, side, 0.0])
+        one = replace(rolling, v_W_mps=v_W)
+        slide = (beside.slide_mps or BLIND_VELOCITY_MPS, beside.slide_mps > 0)
+        readings += wheels.readings(one, T_BW, at_W, *slide)
+    return [*readings, *(wheels.standing(readings, remarks) if beside.stand else ())]
+
+
+def _of_topic(bag: Bag, beside: Beside, remarks: list[str]) -> tuple[Rolling, Floats, str]:
+    """Of odometry or twists, with the yaw rates and the frame that the messages name."""
+    topic = bag.require(beside.topic, *TWISTS)
+    of_twist = TWISTS[bag.types[topic]]
+
+    def row(message: Any) -> list[float]:
+        twist = of_twist(message)
+        whole = getattr(getattr(message, "twist", None), "covariance", None)
+        variance = np.zeros(3) if whole is None else np.asarray(whole, float)[[0, 7, 14]]
+        told = np.where(np.isfinite(variance) & (variance > 0), variance, 0.0)
+        return [*xyz(twist.linear), float(twist.angular.z), *np.sqrt(told).tolist()]
+
+    t_ns, numbers, frame = rows_of(bag, topic, row, remarks)
+    sigma = numbers[:, 4:]
+    measured = [letter in beside.letters for letter in WHEEL.letters]
+    if beside.sigma_mps or not ((sigma > 0) & (sigma < SIGMA_MAX_MPS))[:, measured].all():
+        sigma = np.full_like(sigma, _sigma_wanted(bag, topic, beside))
+    return Rolling(t_ns, numbers[:, :3], sigma, beside.letters), numbers[:, 3], frame
+
+
+def _sigma_wanted(bag: Bag, topic: str, beside: Beside) -> float:
+    if not beside.sigma_mps:
+        due = "--wheel-sigma M/S is due: how far a speed is off, slip apart; 0.05 for many wheels"
+        raise ForeignFileError(bag.path, "messages tell no covariance", at=topic, due=due)
+    return beside.sigma_mps
+
+
+def _seat(topic: str, frame: str, body: str, tree: Tree, remarks: list[str]) -> Poses:
+    """The wheels' frame in the body's, which is the IMU's."""
+    if not tree.knows(frame, body):
+        if frame != body:
+            remarks.append(
+                f"{topic}: wheels of the frame {frame!r}, taken as the body's own ({body!r}): "
+                "/tf_static joins them not"
+            )
+        return Poses(np.eye(3), np.zeros(3))
+    chain = tree.chain(frame, body)
+    remarks.append(f"{topic}: the wheels sit as /tf_static says: {chain.words}")
+    return chain.T

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""Readings of small sensors that contradict what the filter knows: wheels that slip beside an IMU,
+a position that is off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from pelorus.explain.finding import Cause, Finding
+from pelorus.explain.log import Log, runs
+from pelorus.frames import Message, Reading
+from pelorus.schema import SENSORS, number
+from pelorus.small_sensors import name_of
+
+REJECTED = number("reason", "READINGS_REJECTED")
+FRAMES_LEAST = 2  # one is no event
+
+
+def of_small(log: Log, messages: Sequence[Message]) -> Iterator[Finding]:
+    """Frames in a row before which readings were rejected; which sensors there were, and how far
+    off wheels read.
+    """
+    readings = [m for m in messages if isinstance(m, Reading)]
+    for first, last in runs(log.said(REJECTED)):
+        begin, end = int(log.t_ns[max(first - 1, 0)]), int(log.t_ns[last])
+        meanwhile = [m for m in readings if begin <= m.t_ns <= end]
+        if last - first + 1 < FRAMES_LEAST or not meanwhile:
+            continue
+        names = ", ".join(sorted({name_of(m.sensor) for m in meanwhile}))
+        words = f"readings of {names} are rejected, or off by more than their sigma"
+        yield Finding(Cause.READINGS_OFF, begin, end, words + _rolled(log, meanwhile))
+
+
+def _rolled(log: Log, readings: Sequence[Reading]) -> str:
+    """What wheels say of the speed ahead, and what the filter does."""
+    ahead = [m for m in readings if m.sensor == SENSORS["wheel"] and m.axes & 1]
+    poses = [pose for pose in log.poses if pose is not None]
+    if not ahead or not poses:
+        return ""
+    at = np.searchsorted([pose.t_ns for pose in poses], [m.t_ns for m in ahead])
+    known = [poses[k].v_B_mps[0] for k in np.minimum(at, len(poses) - 1)]
+    wheels = float(np.median([m.value[0] for m in ahead]))
+    return f": wheels {wheels:.2f} m/s ahead where the body goes {np.median(known):.2f} m/s"
