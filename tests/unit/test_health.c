@@ -291,7 +291,7 @@ static void test_the_count_of_matches_cannot_overflow(void) {
 /* ---------------------------------------------------------------- the locked gate */
 
 static bool is_locked(unsigned matched, unsigned gated) {
-    const plr_search_evidence e = {matched, gated, false};
+    const plr_search_evidence e = {matched, gated, false, 0};
     const plr_search_decision decision = plr_supervise_search(&supervisor, &e);
     TEST_ASSERT_FALSE(decision.wait || decision.hold_biases);
     /* landmarks that it made would agree with the wrong pose */

@@ -229,7 +229,7 @@ static void test_one_wild_frame_is_not_used_and_the_next_is(void) {
 }
 
 static void test_a_second_frame_confirms_and_one_that_rejects_nearly_all_does_not_deny(void) {
-    const plr_search_evidence at_a_loss = {10, 9, false};
+    const plr_search_evidence at_a_loss = {10, 9, false, 0};
     add_agreement(BEFORE);
     TEST_ASSERT_TRUE(search(true).wait);
     end_frame(0);
