@@ -244,5 +244,5 @@ static void test_the_world_model(void) {
 }
 
 static void test_an_imu(void) {
-    hold_against_others(fly, 1e-4);
+    hold_against_others(fly, 3e-4);
 }

@@ -253,7 +253,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
     const uint32_t count_at = 13 + 9 * 59 + 17 * real;
     const uint32_t frames_at = count_at + 4 + 18 + 24 + 2 + 143 * real;
-    const uint32_t health_at = frames_at + 68 + 412 * real;
+    const uint32_t health_at = frames_at + 76 + 412 * real;
     const uint32_t totals_at = health_at + 25;
     const uint32_t slots_at = totals_at + 68 + 56;
     const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
@@ -276,7 +276,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(809 + 572 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(817 + 572 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(
         slots_at + driven.count * slot + (dim * (dim + 1) / 2 + 5 * dim + 5) * real, state.length);
 }

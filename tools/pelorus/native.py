@@ -12,14 +12,14 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, Literal
 
-from pelorus import __version__, distribution, schema
+from pelorus import __version__, distribution
 from pelorus.errors import PelorusError
 from pelorus.reason import Reason
+from pelorus.structure import Struct, with_reasons
 
 Precision = Literal["float32", "float64"]
-S = TypeVar("S", bound=c.Structure)
 
 PACKAGED = Path(__file__).resolve().parent / "native"  # of a wheel
 BUILT = Path("build/bin")  # of a checkout
@@ -38,35 +38,6 @@ def folders(chosen: Path | None) -> list[Path]:
     return [named] if named else [PACKAGED, BUILT, SOURCE_ROOT / BUILT]
 
 
-class _Struct(c.Structure):
-    """One of include/pelorus; its `_fields_` are the header's, in their order."""
-
-    c_name: ClassVar[str]
-
-    def __repr__(self) -> str:
-        names = (field[0] for field in self._fields_)
-        told = (f"{name}={_told(name, getattr(self, name))}" for name in names)
-        return f"{type(self).__name__}({', '.join(told)})"
-
-
-def _told(name: str, value: Any) -> str:
-    """A member, as a struct shows itself."""
-    if name == "health":
-        return schema.HEALTHS.get(value, str(value))
-    if isinstance(value, Reason):
-        return str(value)
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return repr(list(value)) if isinstance(value, c.Array) else repr(value)
-
-
-def _with_reasons(struct: type[S]) -> type[S]:
-    """The class, with `reasons` a Reason; the library's number stays where it is."""
-    bits: Any = vars(struct)["reasons"]
-    setattr(struct, "reasons", property(lambda own: Reason(bits.__get__(own))))  # noqa: B010
-    return struct
-
-
 def _doubles(n: int) -> type[c.Array[c.c_double]]:
     return c.c_double * n
 
@@ -75,21 +46,21 @@ def _floats(n: int) -> type[c.Array[c.c_float]]:
     return c.c_float * n
 
 
-class Pose(_Struct):
+class Pose(Struct):
     """A rigid motion x -> R x + p."""
 
     c_name = "plr_pose"
     _fields_ = (("R", _doubles(9)), ("p", _doubles(3)))
 
 
-class Twist(_Struct):
+class Twist(Struct):
     """A velocity in the body's axes; of an IMU specific force and rate."""
 
     c_name = "plr_twist"
     _fields_ = (("linear", _doubles(3)), ("angular", _doubles(3)))
 
 
-class Calibration(_Struct):
+class Calibration(Struct):
     """A rectified stereo camera."""
 
     c_name = "plr_calibration"
@@ -103,7 +74,7 @@ class Calibration(_Struct):
     )
 
 
-class Frame(_Struct):
+class Frame(Struct):
     """The observations of one stereo pair."""
 
     c_name = "plr_frame"
@@ -119,7 +90,7 @@ class Frame(_Struct):
     )
 
 
-class Landmark(_Struct):
+class Landmark(Struct):
     """A landmark in the world."""
 
     c_name = "plr_landmark"
@@ -141,7 +112,7 @@ class Landmark(_Struct):
     )
 
 
-class Reading(_Struct):
+class Reading(Struct):
     """A reading of a small sensor."""
 
     c_name = "plr_reading"
@@ -155,7 +126,7 @@ class Reading(_Struct):
     )
 
 
-class ReadingResult(_Struct):
+class ReadingResult(Struct):
     """What became of a reading: `used`, and `d2`, its squared distance from what was expected, in
     sigmas."""
 
@@ -166,8 +137,8 @@ class ReadingResult(_Struct):
     _fields_ = (("status", c.c_int), ("used", c.c_bool), ("d2", c.c_double))
 
 
-@_with_reasons
-class Report(_Struct):
+@with_reasons
+class Report(Struct):
     """What happened to one stereo frame: plr_report of include/pelorus/types.h, where each number
     is explained. Its reasons are flags: `Reason.FROZEN_IMAGE in report.reasons`."""
 
@@ -222,7 +193,7 @@ class Report(_Struct):
     )
 
 
-class RejectedLandmark(_Struct):
+class RejectedLandmark(Struct):
     """A landmark that was seen and not used."""
 
     c_name = "plr_rejected_landmark"
@@ -238,7 +209,7 @@ class RejectedLandmark(_Struct):
     )
 
 
-class Supervision(_Struct):
+class Supervision(Struct):
     """What the supervisor saw in one frame and what it decided: plr_supervision of
     include/pelorus/types.h. Differences are (rho, theta): m and rad in the body's axes."""
 
@@ -293,8 +264,8 @@ class Supervision(_Struct):
     )
 
 
-@_with_reasons
-class Health(_Struct):
+@with_reasons
+class Health(Struct):
     """How far the estimate may be trusted at some time, and why. Seconds since what never happened
     are infinite."""
 
@@ -323,7 +294,7 @@ COUNTS_32 = (
 COUNTS_64 = ("observations", "matched", "used", "gated", "created", "evicted", "diverged_ns")
 
 
-class Totals(_Struct):
+class Totals(Struct):
     """Counts since the filter was made: plr_totals of include/pelorus/state.h."""
 
     c_name = "plr_totals"
@@ -333,7 +304,7 @@ class Totals(_Struct):
     )
 
 
-class Setting(_Struct):
+class Setting(Struct):
     """A row of the table of settings."""
 
     c_name = "plr_setting"
@@ -354,7 +325,7 @@ class Setting(_Struct):
     )
 
 
-class Sizes(_Struct):
+class Sizes(Struct):
     """What the memory layout of a filter depends on."""
 
     c_name = "plr_sizes"
@@ -380,14 +351,14 @@ StateSink = c.CFUNCTYPE(c.c_int, c.c_void_p, c.c_void_p, c.c_uint32)
 StateSource = c.CFUNCTYPE(c.c_int, c.c_void_p, c.c_uint32, c.c_void_p, c.c_uint32)
 
 
-class Map(_Struct):
+class Map(Struct):
     """The caller's store of landmarks."""
 
     c_name = "plr_map"
     _fields_ = (("context", c.c_void_p), ("sink", Sink), ("source", Source))
 
 
-STRUCTS: tuple[type[_Struct], ...] = (
+STRUCTS: tuple[type[Struct], ...] = (
     *(Pose, Twist, Calibration, Frame, Landmark, Reading, ReadingResult, Report, Supervision),
     *(Health, Totals, Setting, Sizes, Map),
 )
