@@ -316,8 +316,9 @@ typedef struct plr_config {
 
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
-     * It is the least: where the readings scatter by more than twice that, half of their scatter counts,
-     * because vibration comes on top of the data sheet's figure (docs/NUMERICS.md 13). */
+     * It is the least: where the readings scatter by more, their scatter counts, because vibration comes on
+     * top of the data sheet's figure (docs/NUMERICS.md 13). A recording's HEADER may raise this default and the
+     * three below, and does not lower them. */
     double gyro_noise;
 
     /* Setting accel-noise [m/s^2/sqrt(Hz)]: 0 to 100, default 1e-2.

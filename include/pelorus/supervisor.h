@@ -34,6 +34,7 @@ typedef struct plr_picture_evidence {
 typedef struct plr_search_evidence {
     unsigned matched, gated;
     bool outright; /* the points agree on a motion that the odometry excludes */
+    plr_time_ns now_ns;
 } plr_search_evidence;
 
 /* The motion of a frame, by pictures beside odometry. */
@@ -84,7 +85,7 @@ typedef struct plr_frame_events {
     plr_real far_xi[PLR_POSE_DIM], far_nu[PLR_POSE_DIM]; /* by so much, m and rad; in sigmas */
     unsigned adopted, unplaced; /* known landmarks that came in; that could not */
     unsigned cut;               /* landmark corrections limited */
-    bool miscalibrated;         /* an estimated part of the calibration is far beyond its prior */
+    bool miscalibrated;         /* a part of the calibration is refused */
 } plr_frame_events;
 
 /* The biases beside their prior. */
@@ -160,6 +161,7 @@ typedef struct plr_supervisor {
     uint8_t doubt;             /* plr_doubt */
     uint8_t waits, holds_biases, settled; /* what the last frame did: plr_supervision */
     uint8_t outright;      /* the last frame contradicted outright, and waits for the next */
+    plr_time_ns outright_ns; /* since when */
     uint8_t relocated;     /* the pose was found anew since it came into doubt */
     uint8_t settle_frames; /* frames of agreement that end the doubt */
     /* in succession: */

@@ -154,10 +154,11 @@ typedef enum plr_reason {
      * and gyro-sigma for odometry whose errors last longer than a reading, gyro-noise and accel-noise for an
      * IMU; or the calibration is off. `pelorus check` measures them. */
     PLR_REASON_NOISE_MISFIT = 1 << 27,
-    /* A part of the calibration that is estimated (setting calibrate) is more than four sigmas of its
-     * prior from what init was told. If the drive is right about it, take what plr_filter_calibration
-     * tells as the calibration; if the sigma was too small, enlarge it. A wrong IMU (axes, scale, clock)
-     * can look like it. */
+    /* A part of the calibration that was estimated (setting calibrate) would have moved by more than four
+     * sigmas of what was learnt of it. So something else is wrong, and it was put back to what init was
+     * told, is considered from then on, and the rest is learnt anew: plr_calibration_result.estimated says
+     * which it is. The accelerometer's scale looks like a baseline, its axes like a turned camera, a clock
+     * like either; or the calibration is off by many of its sigmas: then enlarge the sigma, or calibrate. */
     PLR_REASON_CALIBRATION_OFF = 1 << 28
 } plr_reason;
 

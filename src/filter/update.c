@@ -126,7 +126,7 @@ static void measure_used(plr_filter *f, const plr_frame *frame, unsigned used) {
 
 /* The gate's counts, for the supervisor. */
 static plr_search_decision ask_after_search(plr_filter *f, unsigned n, bool outright) {
-    plr_search_evidence e = {0, 0, outright};
+    plr_search_evidence e = {.outright = outright, .now_ns = f->t_ns};
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
             e.matched++;
@@ -157,8 +157,6 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     plr_bias_consider(f, decision->hold_biases, &before);
     if (first.outright)
         plr_motion_open_velocity(f);
-    else
-        plr_motion_weigh_velocity(f, plr_supervise_weight(&f->supervisor));
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;

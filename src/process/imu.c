@@ -246,15 +246,12 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
     }
 }
 
-/* Of the variance by which readings scatter about their neighbours this much counts as noise: vibration is in
- * part true motion, and stated sigmas that are right to two times stay as stated. */
-#define NOT_MOTION PLR_R(1)
-
 /* The density of the accelerometer's (0) or the gyro's (1) noise, squared: as stated, or as the readings
- * scatter, if that is more. */
+ * scatter about their neighbours, if that is more. A vibration that is true motion counts, too: sampled so that
+ * neighbours tell little of each other it cannot be integrated. */
 static plr_real density_of(const plr_filter *f, unsigned which) {
     const plr_real stated = which == 0 ? f->par.accel_density : f->par.gyro_density;
-    const plr_real shown = NOT_MOTION * f->inertial.scatter2[which] * f->inertial.usual_s;
+    const plr_real shown = f->inertial.scatter2[which] * f->inertial.usual_s;
     return shown > stated ? shown : stated;
 }
 

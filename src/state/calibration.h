@@ -65,13 +65,14 @@ void plr_calibration_begin(plr_filter *f);
  * U^-T, Lambda = U^T U. */
 void plr_calibration_marginalise(plr_filter *f);
 
-/* Corrects the calibration by what was learnt, and the state with it: dx += S ds. */
+/* Corrects the calibration by what was learnt, and the state with it: dx += S ds. A number that would move
+ * farther than that allows is put back, and refused. */
 void plr_calibration_learn(plr_filter *f);
 
 /* The calibration with its sigmas. */
 void plr_calibration_tell(const plr_filter *f, plr_calibration_result *told);
 
-/* True if an estimated error is beyond four sigmas of its prior. */
+/* True if an error is refused: it would have moved farther than what was learnt of it allows. */
 bool plr_calibration_is_off(const plr_filter *f);
 
 #endif

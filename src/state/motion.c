@@ -101,29 +101,6 @@ void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied) {
     fill_prior(f, applied, PLR_R(900), OPEN_WAY, OPEN_TURN);
 }
 
-void plr_motion_weigh_velocity(plr_filter *f, plr_real weight) {
-    enum { V = PLR_VELOCITY_DIM, D = PLR_DRIVERS };
-    plr_core_motion *m = &f->core_motion;
-    const plr_real more = weight * weight - PLR_R(1);
-    plr_real P_dd[D * D], VP[V * D] = {0}, VPV[V * V] = {0}, VPB[V * PLR_POSE_DIM] = {0};
-    if (!plr_has_block(f, PLR_BLOCK_VELOCITY) || !(more > 0))
-        return;
-    plr_covariance_with_drivers(f, f->layout.driver, D, P_dd);
-    plr_gemm_nn(V, D, D, m->V, D, P_dd, D, VP, D);
-    plr_gemm_nt(V, V, D, VP, D, m->V, D, VPV, V);
-    plr_gemm_nt(V, PLR_POSE_DIM, D, VP, D, f->motion.B, D, VPB, PLR_POSE_DIM);
-    for (unsigned c = 0; c < V; c++) {
-        for (unsigned i = 0; i < V; i++) {
-            plr_real *q = &m->Q_cc[PLR_REST_DIM * i + c];
-            *q = PLR_FMA(more, *q + VPV[V * i + c], *q);
-        }
-        for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-            plr_real *q = &m->Q_nc[PLR_REST_DIM * i + c];
-            *q = PLR_FMA(more, *q + VPB[PLR_POSE_DIM * c + i], *q);
-        }
-    }
-}
-
 void plr_motion_open_velocity(plr_filter *f) {
     plr_core_motion *m = &f->core_motion;
     const plr_real seconds = f->motion.seconds;

@@ -43,13 +43,9 @@ void plr_motion_prior(plr_filter *f, plr_real weight, plr_applied_motion *applie
  * frames: 30 times the sigmas of plr_motion_prior, plus 0.3 m and 0.1 rad. */
 void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied);
 
-/* With an IMU the readings that make a way wrong make the velocity wrong, too. These enlarge its share of the
- * pending motion's noise as either prior enlarges n's: for that of sigmas times `weight` (n, v) by weight^2 - 1
- * times their own covariance; */
-void plr_motion_weigh_velocity(plr_filter *f, plr_real weight);
-
-/* for the open one by what white noise of the readings does that makes 0.3 m of the way in T seconds,
- * (3/T^2) (0.3 m)^2 with a covariance of (3/2T) (0.3 m)^2, and turned by the 0.1 rad. */
+/* With an IMU the readings that make a way wrong make the velocity wrong, too. For the open prior this enlarges the
+ * velocity's share of the pending motion's noise by what white noise of the readings does that makes 0.3 m of the way in T
+ * seconds, (3/T^2) (0.3 m)^2 with a covariance of (3/2T) (0.3 m)^2, and turns it by the 0.1 rad. */
 void plr_motion_open_velocity(plr_filter *f);
 
 /* The same motion taken at nu = z. `prior` is from plr_motion_prior. */

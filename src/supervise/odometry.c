@@ -105,7 +105,7 @@ static bool has_before(const plr_supervisor *s) {
 }
 
 bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
-    return s->slips && has_before(s);
+    return has_before(s);
 }
 
 /* ---------------------------------------------------------------- the difference of two poses */
@@ -269,7 +269,7 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
     const bool contradicts = weighed > plr_limit(s, PLR_LIMIT_CONTRADICTS_ABOVE);
     s->contradicting_frames = contradicts ? one_more(s->contradicting_frames) : 0;
     verdict.contradicts =
-        before && !plr_doubt_contradicted(s) &&
+        before && s->slips && !plr_doubt_contradicted(s) &&
         s->contradicting_frames >= plr_limit_count(s, PLR_LIMIT_CONTRADICTS_FRAMES);
     verdict.departs = before && s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE);
     if (!held)

@@ -52,10 +52,20 @@ static void lose(plr_supervisor *s) {
 
 /* ---------------------------------------------------------------- the three points of a frame */
 
+/* True if points have excluded the odometry for long enough to be followed: twists for one frame; an IMU for as long
+ * as it takes far points, which have no part in a motion near the camera, to tell it from that of the body. */
+static bool is_confirmed(const plr_supervisor *s, plr_time_ns now_ns) {
+    if (s->slips)
+        return s->outright || plr_limit_count(s, PLR_LIMIT_CONFIRMED) == 0;
+    const double since_s = 1e-9 * (double)(now_ns - s->outright_ns);
+    return since_s >= (double)plr_limit(s, PLR_LIMIT_CONFIRMED_S);
+}
+
 plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evidence *e) {
     plr_search_decision decision = {false, false, false, false};
-    const bool first = e->outright && !s->outright && !plr_doubt_contradicted(s);
-    decision.wait = first && plr_limit_count(s, PLR_LIMIT_CONFIRMED) > 0;
+    if (e->outright && !s->outright)
+        s->outright_ns = e->now_ns;
+    decision.wait = e->outright && !plr_doubt_contradicted(s) && !is_confirmed(s, e->now_ns);
     /* a frame that rejects nearly all neither confirms nor denies */
     const bool denies = !plr_pictures_reject_all(s, e->matched, e->gated);
     s->outright = e->outright || (s->outright && !denies);

@@ -8,6 +8,7 @@
 
 #include "pelorus/filter.h"
 #include "process/process.h"
+#include "support/held_step.h"
 #include "support/matrices.h"
 #include "support/pose_of.h"
 #include "support/reseal.h"
@@ -203,10 +204,8 @@ static void step_all(void) {
     for (unsigned k = 0; k < READINGS; k++) {
         plr_real reading[6];
         to_reals(reading, real.reading[k], 6);
-        plr_step step = {.seconds = (plr_real)tau, .interval = (plr_real)tau};
-        memcpy(step.mean, reading, sizeof step.mean);
-        memcpy(step.whole, reading, sizeof step.whole);
-        plr_process_imu.step(&filter, filter.t_ns + 2500000, &step);
+        held_step(&plr_process_imu, &filter, filter.t_ns + 2500000, reading, (plr_real)tau,
+                  (plr_real)tau);
     }
     reseal(&filter);
 }
@@ -358,7 +357,7 @@ static double density_of_a_step(double mps2) {
         force[3 + i] = real.bias[3 + i];
     }
     to_reals(reading, force, 6);
-    plr_process_imu.step(&once, once.t_ns + 2500000, reading, PLR_R(0.0025), PLR_R(0.0025));
+    held_step(&plr_process_imu, &once, once.t_ns + 2500000, reading, PLR_R(0.0025), PLR_R(0.0025));
     return (double)once.core_motion.Q_cc[0] / tau;
 }
 
@@ -385,9 +384,11 @@ static void test_parts_of_an_interval_add_up_to_the_whole(void) {
     plr_real reading[6];
     to_reals(reading, real.reading[0], 6);
     whole = filter;
-    plr_process_imu.step(&whole, whole.t_ns + 4000000, reading, PLR_R(0.004), PLR_R(0.004));
-    plr_process_imu.step(&filter, filter.t_ns + 1000000, reading, PLR_R(0.001), PLR_R(0.004));
-    plr_process_imu.step(&filter, filter.t_ns + 3000000, reading, PLR_R(0.003), PLR_R(0.004));
+    held_step(&plr_process_imu, &whole, whole.t_ns + 4000000, reading, PLR_R(0.004), PLR_R(0.004));
+    held_step(&plr_process_imu, &filter, filter.t_ns + 1000000, reading, PLR_R(0.001),
+              PLR_R(0.004));
+    held_step(&plr_process_imu, &filter, filter.t_ns + 3000000, reading, PLR_R(0.003),
+              PLR_R(0.004));
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, whole.p_WB[i], filter.p_WB[i]);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, (double)whole.inertial.velocity[i],

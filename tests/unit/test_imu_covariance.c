@@ -9,6 +9,7 @@
 #include "filter/predict.h"
 #include "process/process.h"
 #include "state/covariance.h"
+#include "support/held_step.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/pose_of.h"
@@ -38,7 +39,8 @@ static void take_specimen(unsigned landmarks, bool noiseless) {
         for (unsigned i = 0; i < 3; i++) /* about what a hovering body feels */
             reading[i] += 9.81 * (double)filter.R_WB[6 + i];
         to_reals(held, reading, 6);
-        plr_process_imu.step(&filter, filter.t_ns + 10000000, held, PLR_R(0.01), PLR_R(0.01));
+        held_step(&plr_process_imu, &filter, filter.t_ns + 10000000, held, PLR_R(0.01),
+                  PLR_R(0.01));
     }
     if (noiseless) {
         memset(filter.motion.Q, 0, sizeof filter.motion.Q);

@@ -13,6 +13,7 @@
 #include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
+#include "support/held_step.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
@@ -72,7 +73,8 @@ static void drive_filter(void) {
         to_reals(reading, drive.twist[k], 6);
         to_doubles(drive.twist[k], reading, 6);
         drive.seconds[k] = (double)PLR_R(0.02);
-        plr_process_twist.step(&filter, filter.t_ns + 20000000, reading, PLR_R(0.02), PLR_R(0.02));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 20000000, reading, PLR_R(0.02),
+                  PLR_R(0.02));
     }
     to_doubles(drive.bias, filter.bias, 6);
     displacement((const double[6]){0}, drive.estimate);

@@ -12,6 +12,7 @@
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/pose.h"
+#include "support/held_step.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/pose_of.h"
@@ -113,7 +114,8 @@ static void test_steps_move_the_pose_by_exponentials(void) {
         rigid_exp(D, xi);
         square_multiply(4, T, D, next);
         memcpy(T, next, sizeof T);
-        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 50000000, reading, PLR_R(0.05),
+                  PLR_R(0.05));
     }
     pose_now(got);
     TEST_ASSERT_DOUBLE_WITHIN(30 * STEPS * eps, 0, largest_difference(T, got, 16));
@@ -129,7 +131,8 @@ static void test_far_from_the_origin_small_steps_are_not_lost(void) {
         filter.R_WB[i] = i % 4 == 0;
     filter.p_WB[0] = 1e4;
     for (int k = 0; k < 10000; k++)
-        plr_process_twist.step(&filter, filter.t_ns + 10000000, creep, PLR_R(0.01), PLR_R(0.01));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 10000000, creep, PLR_R(0.01),
+                  PLR_R(0.01));
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1e4 + 1, filter.p_WB[0]);
 }
 
@@ -140,7 +143,8 @@ static void test_the_motion_accumulates_as_a_product(void) {
         plr_real reading[6];
         double same[6];
         random_reading(reading, same);
-        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 50000000, reading, PLR_R(0.05),
+                  PLR_R(0.05));
     }
     pose_now(end);
     rigid_inverse(inverse, start);
@@ -176,7 +180,8 @@ static void test_noise_and_bias_jacobian_follow_their_recursions(void) {
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 6, 6, 1, A, B, 0, next);
         for (int i = 0; i < 36; i++)
             B[i] = next[i] - tau * Jr[i];
-        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 50000000, reading, PLR_R(0.05),
+                  PLR_R(0.05));
     }
     double got_Q[36], got_B[36];
     to_doubles(got_Q, filter.motion.Q, 36);
@@ -192,7 +197,8 @@ static void test_bias_jacobian_agrees_with_differences(void) {
     for (int k = 0; k < STEPS; k++) {
         plr_real reading[6];
         random_reading(reading, twists[k]);
-        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 50000000, reading, PLR_R(0.05),
+                  PLR_R(0.05));
     }
     for (int j = 0; j < 6; j++) {
         double D[3][16];
@@ -228,8 +234,8 @@ static double charged(plr_noise_kind noise, double part_s, int parts) {
     filter.config.noise = (uint8_t)noise;
     filter.par.velocity_variance[0] = PLR_R(4);
     for (int k = 0; k < parts; k++)
-        plr_process_twist.step(&filter, filter.t_ns + 1000000, standing, (plr_real)part_s,
-                               PLR_R(0.1));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 1000000, standing, (plr_real)part_s,
+                  PLR_R(0.1));
     return (double)filter.motion.Q[0];
 }
 
@@ -300,7 +306,8 @@ static void test_a_correction_makes_the_rotation_one_again(void) {
 static void test_the_rotation_stays_one_through_an_hour_of_steps(void) {
     const plr_real turning[6] = {PLR_R(1), 0, 0, PLR_R(0.1), PLR_R(-0.3), PLR_R(0.5)};
     for (int k = 0; k < 360000; k++)
-        plr_process_twist.step(&filter, filter.t_ns + 10000000, turning, PLR_R(0.01), PLR_R(0.01));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 10000000, turning, PLR_R(0.01),
+                  PLR_R(0.01));
     TEST_ASSERT_DOUBLE_WITHIN(10 * eps, 0, distance_from_rotation());
 }
 
@@ -311,7 +318,8 @@ static void drive(void) {
         plr_real reading[6];
         double same[6];
         random_reading(reading, same);
-        plr_process_twist.step(&filter, filter.t_ns + 10000000, reading, PLR_R(0.01), PLR_R(0.01));
+        held_step(&plr_process_twist, &filter, filter.t_ns + 10000000, reading, PLR_R(0.01),
+                  PLR_R(0.01));
     }
 }
 

@@ -53,7 +53,7 @@ static void end_frame(unsigned used) {
 }
 
 static plr_search_decision search(bool outright) {
-    const plr_search_evidence found = {10, 0, outright};
+    const plr_search_evidence found = {10, 0, outright, 0};
     return plr_supervise_search(&s, &found);
 }
 

@@ -38,7 +38,7 @@ SHORT = {
     "BIAS_OFF_PRIOR": "a bias is far from its prior",
     "FROZEN_IMAGE": "identical pixels",
     "NOISE_MISFIT": "pictures and odometry differ by more than their sigmas, all along",
-    "CALIBRATION_OFF": "the calibration is estimated far from what was told",
+    "CALIBRATION_OFF": "a part of the calibration was refused: it would have moved too far",
     "RECOVERED": "landmarks dropped and covariance widened",
     "NO_FRAMES": NO_FRAMES,
     "STATE_DAMAGED": "the filter's memory was changed",

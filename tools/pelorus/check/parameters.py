@@ -45,6 +45,7 @@ WALKS = {
     "gyro-walk": Parameter("gyro-walk", 1e-4, 1e-7, 0.1, "gyro_walk"),
     "accel-walk": Parameter("accel-walk", 1e-3, 1e-6, 1.0, "accel_walk"),
 }
+DENSITIES = ("gyro-noise", "accel-noise", "gyro-walk", "accel-walk")
 BIASES = {
     name: Parameter(name, DEFAULTS[name], 0.0, most, suggestion)
     for name, most, suggestion in (
@@ -112,6 +113,8 @@ def _axes(header: Header, given: Settings, name: str, parameter: Parameter) -> l
     suggested = vars(header.noise)
     value = suggested[parameter.suggestion]
     usual = value if value > 0 else parameter.default
+    if parameter.setting in DENSITIES:  # a HEADER raises them, as in a session
+        usual = max(value, parameter.default)
     if parameter not in (TWIST.get(name),):
         return [usual]
     of_axes = [suggested[key] for key in AXIS_SUGGESTIONS.get(name, ())]
