@@ -48,7 +48,7 @@ def series(messages: list[Message]) -> Series | None:
     truth = truth_in(messages)
     if truth is None or not readings:
         return None
-    t_ns = np.concatenate([m.times_ns() for m in readings])
+    t_ns = np.concatenate([m.times_ns for m in readings])
     begin = int(truth.t_ns[0])
     return Series(
         (t_ns - begin) * 1e-9,
