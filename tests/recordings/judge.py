@@ -42,6 +42,7 @@ from pelorus import schema
 from pelorus.evaluation import assess, by_imu
 from pelorus.frames import Kind, Message, Report
 from pelorus.health import GOOD, NOT_STARTED, time_line
+from pelorus.layout import Floats
 from pelorus.road import compare, read_road
 from pelorus.trajectory import estimate_in, filled, truth_in
 from pelorus.wire import messages_of
@@ -210,7 +211,7 @@ def figures(messages: list[Message]) -> Figures:
     return out | _honesty(of_frame, np.nanmax(sigmas, axis=1))
 
 
-def _honesty(reports: Sequence[Report | None], worst: np.ndarray) -> Figures:
+def _honesty(reports: Sequence[Report | None], worst: Floats) -> Figures:
     """Whether health fits the error, which is given in sigmas, its largest component."""
     good = np.array([report is not None and report.health == GOOD for report in reports])
     seen = np.array([report is not None and report.used >= 3 for report in reports])
