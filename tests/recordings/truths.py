@@ -54,7 +54,7 @@ def series(messages: list[Message]) -> Series | None:
         (t_ns - begin) * 1e-9,
         np.concatenate([m.w_B_radps for m in readings]).astype(float),
         np.concatenate([m.a_B_mps2 for m in readings]).astype(float),
-        (truth.t_ns - begin) * 1e-9,
+        ((truth.t_ns - begin) * 1e-9).astype(float),
         Rotation.from_matrix(truth.poses.R),
         truth.poses.p,
     )
