@@ -142,7 +142,7 @@ def gravity(s: Series, late: float) -> Floats:
         G -= Q @ (Q.T @ G)
         y = (s.p[truths] - way).ravel()
         A, b = A + G.T @ G, b + G.T @ y
-    return np.linalg.solve(A, b)
+    return np.linalg.solve(A, b).astype(float)
 
 
 def residual_m(s: Series, late: float, gyro_bias: Floats, g: Floats) -> float:
