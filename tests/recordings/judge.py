@@ -2,22 +2,34 @@
 """Real recordings through a build of the replay: how far off the filter is, beside its odometry
 alone, and whether its health says so.
 
-usage: judge.py [--bin build/bin] [--only TEXT] [--f64] [-- REPLAY OPTIONS]
+usage: judge.py [--bin build/bin] [--only TEXT] [--f64 | --both] [-- REPLAY OPTIONS]
+       judge.py --without supervisor [--bin-without BIN] [--write] [--only TEXT] [--f64]
 
-The recordings are those of $PELORUS_DATA, by default ../shared/data; absent ones are left out.
+The recordings are those of $PELORUS_DATA, by default ../shared/data; absent ones are left out. A
+person who walks past the camera is simulated, 18 times, and shown by the worst figure of each kind.
 
 ATE, err0   m, as `pelorus evaluate` has them; of 03 the RMS distance to the road
 reckoned    ATE of the odometry alone, m; ratio: ATE beside it
-NEES/6      mean; 1 is due
+NEES/6      mean; 1 is expected
 good        share of the frames GOOD, since the start
 false       share not GOOD though all of the error is within 2 sigma and three points are used
-silent      share GOOD though a component is beyond 5 sigma
+silent      share GOOD though a component is beyond 5 sigma; beyond 3: the same with 3
+within 2    share GOOD of the frames whose error is within 2 sigma
+diverged    frames in which a variance was not positive or the filter recovered
+worst, sig  the largest error of the position, m, and in sigmas of an axis
+f32/f64     with --both, which runs both precisions: ATE beside that of float64
+
+--without supervisor  the error beside that of a replay without it (PLR_SUPERVISE=OFF), which is
+                      built in build/without-supervisor if no --bin-without is given; --write puts
+                      the table into docs/SUPERVISION.md
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -26,11 +38,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pelorus import schema
 from pelorus.evaluation import assess, by_imu
 from pelorus.frames import Kind, Message, Report
-from pelorus.health import time_line
+from pelorus.health import GOOD, NOT_STARTED, time_line
+from pelorus.layout import Floats
 from pelorus.road import compare, read_road
-from pelorus.schema import HEALTHS
 from pelorus.trajectory import estimate_in, filled, truth_in
 from pelorus.wire import messages_of
 
@@ -38,18 +51,30 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT / "../shared/data"))
 DRIVES = ("09_26_drive_0001", "09_26_drive_0036", "09_30_drive_0020", "10_03_drive_0042")
 KITTI_07 = str(DATA / "truth/kitti-odometry-07.txt")
-COLUMNS = ("ATE", "reckoned", "ratio", "err0", "NEES/6", "good", "false", "silent")
+PERSON = "wild2/01-person-walks-past"
+COLUMNS = (
+    *("ATE", "reckoned", "ratio", "err0", "NEES/6", "good", "false", "silent", "beyond 3"),
+    *("within 2", "diverged", "worst", "sig", "f32/f64"),
+)
+LEAST_IS_WORST = ("good", "within 2")
+DIVERGED = schema.number("reason", "NOT_POSITIVE") | schema.number("reason", "RECOVERED")
+PAGE = ROOT / "docs/SUPERVISION.md"
+MARKED = re.compile(r"(<!-- table: recordings, by judge\.py -->\n).*?(<!-- end -->)", re.DOTALL)
+WORSE = 1.05  # an error with the supervisor beside the one without, above which it is told
 Figures = dict[str, float]
 
 
 @dataclass(frozen=True)
 class Case:
-    """A recording, how it is converted, and the options of its replay."""
+    """A recording, how it is converted (nothing: it is a .plr already), the options of its replay,
+    and the figure by which two runs of it are compared.
+    """
 
     name: str
     file: str
     convert: tuple[str, ...]
     options: tuple[str, ...] = ()
+    figure: str = "ATE"
 
 
 def conf(name: str) -> tuple[str, ...]:
@@ -74,19 +99,74 @@ def cases() -> Iterator[Case]:
     fresh = f"{starry}_fresh_40lessnoisy.mat"
     located = ("--mode", "localization")
     yield Case("fresh_40, localization", fresh, ("starry-night",), located)
-    euroc = "imu/euroc-V102-real-imu.npz"
-    yield Case("euroc V102, default", euroc, ("imu-npz",))
-    yield Case("euroc V102", euroc, ("imu-npz",), conf("imu-adis16448"))
+    yield from by_real_imu()
     for name in ("tum_corridor1", "udel_gore_zupt"):
         yield Case(name, f"imu/{name}-60-seed0.npz", ("imu-npz",), conf("imu"))
 
 
+def by_real_imu() -> Iterator[Case]:
+    """EuRoC: real readings with simulated points, with tracks of real pictures, with pictures."""
+    for name, file, convert, figure in (
+        ("euroc V101", "imu/euroc-V101-real-imu.npz", ("imu-npz",), "ATE"),
+        ("euroc V102", "imu/euroc-V102-real-imu.npz", ("imu-npz",), "ATE"),
+        ("euroc V203", "imu/euroc-V203-real-imu.npz", ("imu-npz",), "ATE"),
+        ("euroc MH01 tracks", "imu/euroc-mh01-tracks.plr", (), "err0"),
+        ("euroc MH01 pictures", "images/euroc-mh01-start", ("euroc",), "err0"),
+    ):
+        yield Case(f"{name}, default", file, convert, (), figure)
+        yield Case(name, file, convert, conf("imu-adis16448"), figure)
+
+
+# --- a person who walks past ----------------------------------------------------------------------
+
+
+def people(folder: Path) -> Iterator[Case]:
+    """The drives of wild2/01, made in `folder` where they are not there; none without the data."""
+    if not (DATA / PERSON).is_dir():
+        return
+    made = folder / "wild2" / Path(PERSON).name
+    whole = made / "made"  # a run that was ended early leaves some of the drives
+    if not whole.exists():
+        for part in (PERSON, "wild2/common"):
+            target = folder / "wild2" / Path(part).name
+            # contents alone: the share may be read-only, and its modes would come along
+            shutil.copytree(DATA / part, target, copy_function=shutil.copyfile, dirs_exist_ok=True)
+        print("making 18 drives with a person: some minutes", file=sys.stderr, flush=True)
+        make = [sys.executable, "make.py"]
+        said = subprocess.run(make, cwd=made, capture_output=True, text=True, check=False)
+        if said.returncode:
+            sys.exit(f"{made}: make.py, which needs numpy, scipy and ruamel.yaml:\n{said.stderr}")
+        whole.touch()
+    # imu.yaml is left out: the defaults stand, as for who fills in plr_config by himself
+    for drive in sorted(path.parent for path in made.glob("*/tracks.csv")):
+        named = {"imu": "imu.csv", "truth": "truth.tum", "calibration": "camchain.yaml"}
+        pairs = ((f"--{option}", str(drive / file)) for option, file in named.items())
+        convert = ("csv", *(word for pair in pairs for word in pair))
+        yield Case(f"person {drive.name}", str(drive / "tracks.csv"), convert, (), "worst")
+
+
+def worst_of(found: Sequence[Figures]) -> Figures:
+    """Of each figure the worst."""
+    names = {name: None for one in found for name in one}
+    return {
+        name: (min if name in LEAST_IS_WORST else max)(one.get(name, np.nan) for one in found)
+        for name in names
+    }
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
 def converted(case: Case, folder: Path) -> Path:
     """Converted once a folder."""
-    out = folder / (case.file.replace("/", "-") + ".plr")
+    source = DATA / case.file
+    if not case.convert:
+        return source
+    out = folder / (case.file.strip("/").replace("/", "-") + ".plr")
     if not out.exists():
         kind, *options = case.convert
-        command = [sys.executable, "-m", "pelorus", "convert", kind, str(DATA / case.file)]
+        of_tracks = ("--stereo",) if kind == "csv" else ()
+        command = [sys.executable, "-m", "pelorus", "convert", kind, *of_tracks, str(source)]
         command += [str(out), *options]
         said = subprocess.run(command, capture_output=True, text=True, check=False)
         if not out.exists():
@@ -108,10 +188,10 @@ def figures(messages: list[Message]) -> Figures:
     answers = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STEREO]
     reports = {m.t_ns: m for m in answers if m.status == 0}
     found, truth = estimate_in(messages), truth_in(messages)
-    out: Figures = {}
+    out: Figures = {"diverged": sum(m.reasons & DIVERGED != 0 for m in answers)}
     line = time_line(list(reports.values()))
     if line is not None and any(m.matched for m in reports.values()):
-        out["good"] = line.by_health[HEALTHS[0]] / line.frames
+        out["good"] = line.by_health[schema.HEALTHS[GOOD]] / line.frames
     if found is None:
         return out
     if truth is None:  # 03
@@ -121,17 +201,107 @@ def figures(messages: list[Message]) -> Figures:
     if accuracy is None:
         return out
     with np.errstate(divide="ignore", invalid="ignore"):
-        worst = np.nanmax(np.abs(accuracy.error) / accuracy.sigma, axis=1)
-    worst[0] = 0  # aligned there
-    of_frame = [reports.get(t) for t in accuracy.t_ns.tolist()]
-    health = np.array([3 if report is None else report.health for report in of_frame])
-    seen = np.array([report is not None and report.used >= 3 for report in of_frame])
+        sigmas = np.abs(accuracy.error) / accuracy.sigma
+    sigmas[0] = 0  # aligned there
     out |= {"ATE": accuracy.ate_m, "err0": accuracy.err0_m}
     out["NEES/6"] = accuracy.nees_per_dof or np.nan
+    out["worst"] = float(np.linalg.norm(accuracy.estimate.p - accuracy.truth.p, axis=1).max())
+    out["sig"] = float(np.nanmax(sigmas[:, :3]))
+    of_frame = [reports.get(t) for t in accuracy.t_ns.tolist()]
+    return out | _honesty(of_frame, np.nanmax(sigmas, axis=1))
+
+
+def _honesty(reports: Sequence[Report | None], worst: Floats) -> Figures:
+    """Whether health fits the error, which is given in sigmas, its largest component."""
+    good = np.array([report is not None and report.health == GOOD for report in reports])
+    seen = np.array([report is not None and report.used >= 3 for report in reports])
+    started = np.array([report is None or not report.reasons & NOT_STARTED for report in reports])
+    out: Figures = {}
     if seen.any():
-        out["false"] = float(np.mean((health[seen] != 0) & (worst[seen] <= 2)))
-        out["silent"] = float(np.mean((health == 0) & (worst > 5)))
+        out["false"] = float(np.mean(~good[seen] & (worst[seen] <= 2)))
+        out["silent"] = float(np.mean(good & (worst > 5)))
+        out["beyond 3"] = float(np.mean(good & (worst > 3)))
+        right = started & (worst <= 2)
+        out["within 2"] = float(np.mean(good[right])) if right.any() else np.nan
     return out
+
+
+# --- with and without the supervisor --------------------------------------------------------------
+
+
+def built_without() -> Path:
+    """The programs of a build without the supervisor."""
+    folder = ROOT / "build/without-supervisor"
+    configure = ["cmake", "-S", str(ROOT), "-B", str(folder), "-DCMAKE_BUILD_TYPE=Release"]
+    configure += ["-DPELORUS_BUILD_TESTS=OFF", "-DPLR_SUPERVISE=OFF"]
+    build = ["cmake", "--build", str(folder), "--target", "pelorus-replay", "pelorus-replay-f64"]
+    print(f"building in {folder}", file=sys.stderr, flush=True)
+    for command in (configure, build):
+        said = subprocess.run(command, capture_output=True, text=True, check=False)
+        if said.returncode:
+            sys.exit(f"{' '.join(command)}:\n{said.stdout}{said.stderr}")
+    return folder / "bin"
+
+
+def beside(name: str, figure: str, whole: Figures, alone: Figures) -> str:
+    """A row: the error with and without the supervisor, and what else it changes."""
+    ratio = whole[figure] / alone[figure]
+    told = f"**{ratio:.2f}**" if ratio > WORSE else f"{ratio:.2f}"
+    cells = [name, "road" if name == "03" else figure]
+    cells += [f"{one[figure]:.3g}" for one in (whole, alone)] + [told]
+    for key in ("NEES/6", "beyond 3"):
+        cells.append(", ".join("" if key not in f else f"{f[key]:.2g}" for f in (whole, alone)))
+    return "| " + " | ".join(cells) + " |"
+
+
+def comparison(program: Path, without: Path, given: argparse.Namespace) -> Iterator[str]:
+    """The lines of the table, every real recording and the worst of the drives with a person."""
+    yield "| recording | figure | with, m | without, m | ratio | NEES/6 | GOOD beyond 3 sigma |"
+    yield "|---|---|---|---|---|---|---|"
+
+    def both(case: Case) -> tuple[Figures, Figures]:
+        recording = converted(case, given.cache)
+        options = [*case.options, *given.options]
+        whole, alone = (figures(run(one, recording, options)) for one in (program, without))
+        return whole, alone
+
+    for case in wanted(cases(), given.only):
+        if "tum" not in case.name and "udel" not in case.name:  # those are a simulator's
+            yield beside(case.name, case.figure, *both(case))
+    pairs = {case.name: both(case) for case in wanted(people(given.cache), given.only)}
+    if pairs:
+        ratios = {name: whole["worst"] / alone["worst"] for name, (whole, alone) in pairs.items()}
+        last = max(ratios, key=ratios.__getitem__)
+        print(*(f"{x:.2f} {name}" for name, x in ratios.items()), sep="\n", file=sys.stderr)
+        wholes, alones = zip(*pairs.values(), strict=True)
+        yield beside(
+            f"{len(pairs)} with a person, the worst", "worst", *map(worst_of, (wholes, alones))
+        )
+        yield beside(
+            f"of these, the worst ratio: {last.removeprefix('person ')}", "worst", *pairs[last]
+        )
+
+
+def compare_supervisor(program: Path, given: argparse.Namespace) -> None:
+    """Prints the table, or puts it where docs/SUPERVISION.md holds it."""
+    page = PAGE.read_text(encoding="utf-8")
+    if given.write and (given.only or not MARKED.search(page)):
+        sys.exit(
+            "--write: not beside --only"
+            if given.only
+            else f"{PAGE}: holds no `<!-- table: recordings, by judge.py -->` and `<!-- end -->`"
+        )
+    without = (given.bin_without or built_without()) / program.name
+    lines = []
+    for line in comparison(program, without, given):
+        print(line, flush=True)
+        lines.append(line + "\n")
+    if given.write:
+        text = MARKED.sub(lambda found: found[1] + "".join(lines) + found[2], page)
+        PAGE.write_text(text, encoding="utf-8")
+
+
+# --- the table ------------------------------------------------------------------------------------
 
 
 def parser_of(about: str | None, only: str) -> argparse.ArgumentParser:
@@ -146,25 +316,60 @@ def parser_of(about: str | None, only: str) -> argparse.ArgumentParser:
     return parser
 
 
-def main() -> int:
-    """Prints the table."""
-    parser = parser_of(__doc__, "recordings whose name contains it")
-    parser.add_argument("--f64", action="store_true")
-    parser.add_argument("options", nargs="*")
-    given = parser.parse_args()
-    given.cache.mkdir(exist_ok=True)
-    program = given.bin / ("pelorus-replay-f64" if given.f64 else "pelorus-replay")
-    print(f"{'recording':28}" + "".join(f"{name:>9}" for name in COLUMNS))
-    for case in cases():
-        if given.only not in case.name or not (DATA / case.file).exists():
-            continue
-        recording = converted(case, given.cache)
+def wanted(some: Iterator[Case], only: str) -> Iterator[Case]:
+    """Those that are named and there."""
+    return (case for case in some if only in case.name and (DATA / case.file).exists())
+
+
+def judged(programs: Sequence[Path], case: Case, given: argparse.Namespace) -> list[Figures]:
+    """The figures of each program."""
+    recording = converted(case, given.cache)
+    out = []
+    for program in programs:
         found = figures(run(program, recording, [*case.options, *given.options]))
         alone = figures(run(program, recording, [*case.options, "--mode", "dead_reckoning"]))
         found["reckoned"] = alone.get("ATE", np.nan)
         found["ratio"] = found["ATE"] / found["reckoned"]
-        row = "".join(f"{found.get(name, np.nan):9.3g}" for name in COLUMNS)
-        print(f"{case.name:28}{row}", flush=True)
+        out.append(found)
+    if len(out) == 2:
+        out[0]["f32/f64"] = out[0]["ATE"] / out[1]["ATE"]
+    return out
+
+
+def print_rows(name: str, found: Sequence[Figures]) -> None:
+    """One for each precision."""
+    for title, one in zip((name, "  in float64"), found, strict=False):
+        row = "".join(f"{one.get(column, np.nan):9.3g}" for column in COLUMNS)
+        print(f"{title:28}{row}", flush=True)
+
+
+def main() -> int:
+    """Prints the table."""
+    parser = parser_of(__doc__, "recordings whose name contains it")
+    precision = parser.add_mutually_exclusive_group()
+    precision.add_argument("--f64", action="store_true")
+    precision.add_argument("--both", action="store_true")
+    parser.add_argument("--without", choices=("supervisor",))
+    parser.add_argument("--bin-without", type=Path)
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("options", nargs="*")
+    given = parser.parse_args()
+    given.cache.mkdir(exist_ok=True)
+    names = ["pelorus-replay-f64"] if given.f64 else ["pelorus-replay"]
+    if given.without:
+        compare_supervisor(given.bin / names[0], given)
+        return 0
+    programs = [given.bin / name for name in (*names, *(["pelorus-replay-f64"] * given.both))]
+    print(f"{'recording':28}" + "".join(f"{name:>9}" for name in COLUMNS))
+    for case in wanted(cases(), given.only):
+        print_rows(case.name, judged(programs, case, given))
+    if not given.only or "person" in given.only:
+        drives = [judged(programs, case, given) for case in wanted(people(given.cache), given.only)]
+        if drives:
+            print_rows(
+                f"person, worst of {len(drives)}",
+                [worst_of(one) for one in zip(*drives, strict=True)],
+            )
     return 0
 
 
