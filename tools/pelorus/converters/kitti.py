@@ -240,7 +240,7 @@ def _cameras(folder: Path, known: Sequence[tuple[str, str]]) -> _Folder:
 def _calibrated(folder: Path, rig: Rig, asked: Asked) -> Calibrated:
     name = folder.resolve().name
     if asked.calibration:
-        return rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens)
+        return rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens, asked.cameras)
     return rig_files.of_rig(rig, name, asked.extrinsic)
 
 

@@ -77,13 +77,18 @@ class Cameras:
     frame: str = ""  # of the left one, in place of what its messages say
 
 
+def pictures(bag: Bag) -> list[str]:
+    """The topics that hold some."""
+    return bag.of_type(IMAGE, COMPRESSED)
+
+
 def chosen(bag: Bag, cameras: Cameras, rig: Rig | None = None) -> Cameras:
     """The user's topics; else the calibration's; else the one pair that is called left and right,
     or 0 and 1: 0 is the calibration's first camera.
     """
     if cameras.tracks:
         return cameras
-    there = bag.of_type(IMAGE, COMPRESSED)
+    there = pictures(bag)
     if cameras.left and cameras.right:
         for topic in (cameras.left, cameras.right):
             bag.require(topic, IMAGE, COMPRESSED)

@@ -87,12 +87,13 @@ class Readings:
 class Asked:
     """What a folder or a bag does not say, or says otherwise than its user: in place of its own.
 
-    `calibration`, `extrinsic` and `lens` are as rig.read has them.
+    `calibration`, `extrinsic`, `lens` and `cameras` are as rig.read has them.
     """
 
     calibration: tuple[Path, ...] = ()
     extrinsic: Path | None = None
     lens: LensModel | None = None
+    cameras: tuple[str, ...] = ()
     motion: Twists | Readings | None = None
     truth: Trajectory | None = None
     measured: frozenset[str] = Twists.measured  # of the source's own twists
