@@ -21,7 +21,8 @@ Floats = NDArray[np.float64]
 def readings(seed: int = 4) -> Floats:
     """(COUNT, 6) of an IMU that is turned to and fro."""
     t = np.arange(COUNT)[:, None] / RATE_HZ
-    smooth = np.sin(t * np.array([1.0, 1.3, 0.7, 2.1, 1.7, 0.9])) + [0, 0, 9.8, 0, 0, 0]
+    smooth = np.sin(t * np.array([1.0, 1.3, 0.7, 2.1, 1.7, 0.9]))
+    smooth[:, 2] += 9.8
     return smooth + np.random.default_rng(seed).normal(0, 0.02, smooth.shape)
 
 

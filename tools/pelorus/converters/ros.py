@@ -17,6 +17,8 @@ from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import Rig
 
+WRAPPED = "its clock of 32 bits of us starts again at 0: unwrapped"
+
 
 @dataclass(frozen=True)
 class Topics:
@@ -45,6 +47,7 @@ def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     truth = asked.truth
     if truth is None and topics.moving.truth:
         truth = ros_motion.truth(bag, topics.moving.truth, remarks)
+    remarks += [f"{topic}: {WRAPPED}" for topic in bag.wrapped]
     return Streams(calibrated, frames, motion, truth, small, remarks, bool(small))
 
 

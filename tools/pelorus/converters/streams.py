@@ -42,6 +42,7 @@ FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
+RESOLUTIONS = 8  # stamps may be rounded to 10 ms, and to each finer power of ten
 PAUSE_STEPS = 5.0  # periods without a reading are a pause, across which nothing is interpolated
 # What no robot turns faster than while its tracks hold, about an axis that nothing measures: the
 # pictures find the rotation. It is one constant from frame to frame, in all readings between them.
@@ -147,6 +148,7 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     if calibrated.rig is not None:
         t_ns = calibrated.rig.on_body_clock(t_ns)
     _require_overlap(frames, t_ns, streams.motion)
+    truth = None if streams.truth is None else _at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
         header, tracks = _tracked(frames, calibrated, settings or Settings())
     else:
@@ -157,10 +159,9 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
             header = rig.header(rectification, header.name)
             tracks = _rectified(tracks, rectification, frames.where)
     made = _with_motion(header, streams, t_ns, tracks)
-    if streams.truth is None:
-        return made
-    truth = _at_frames(streams.truth, t_ns)
-    return made.with_truth(truth.t_ns, truth.poses)
+    if len(made.inertial.t_ns):
+        made = replace(made, inertial=_from_truth(made.inertial, truth, t_ns))
+    return made if truth is None else made.with_truth(truth.t_ns, truth.poses)
 
 
 def converted(
@@ -324,8 +325,12 @@ def _held_between(t_ns: Times, timing: TwistTiming) -> Times:
     return np.concatenate((t_ns[:1], half_way, t_ns[-1:]))
 
 
+def _times_of(motion: Twists | Readings) -> Times:
+    return motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
+
+
 def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Readings) -> None:
-    own = motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
+    own = _times_of(motion)
     if t_ns[-1] < own[0] or own[-1] < t_ns[0]:
         where = frames.where if isinstance(frames, Seen) else frames.where[0]
         raise ForeignFileError(
@@ -398,12 +403,35 @@ def _tracked(
 # --- truth ----------------------------------------------------------------------------------------
 
 
-def _at_frames(truth: Trajectory, frame_t_ns: Times) -> Trajectory:
-    """The truth, and between its poses one at each frame without one: there it is compared."""
-    t_ns = truth.t_ns
+def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -> Trajectory:
+    """The truth while the sensors run, and between its poses one at each frame without one: there
+    it is compared; and one where the motion begins, from which a filter starts.
+
+    What a motion capture saw before or behind the sensors is not of the drive.
+    """
+    t_ns, own = truth.t_ns, _times_of(motion)
     if frame_t_ns[-1] < t_ns[0] or t_ns[-1] < frame_t_ns[0]:
         raise PelorusError(
             f"the truth spans {t_ns[0]} to {t_ns[-1]} ns, the frames {frame_t_ns[0]} to "
             f"{frame_t_ns[-1]} ns: they do not overlap; times on the twists' clock are due"
         )
-    return filled(truth, frame_t_ns)
+    if own[0] < t_ns[0] <= own[0] + _resolution_ns(t_ns):
+        t_ns = np.concatenate((own[:1], t_ns[1:]))  # it was rounded
+    whole = filled(truth._replace(t_ns=t_ns), np.union1d(frame_t_ns, own[:1]))
+    first, last = own[0], max(own[-1], frame_t_ns[-1])
+    inside = (whole.t_ns >= first) & (whole.t_ns <= last)
+    return Trajectory(whole.t_ns[inside], whole.poses.at(inside), whole.remarks)
+
+
+def _resolution_ns(t_ns: Times) -> int:
+    """To what the stamps were rounded: the largest power of ten that divides all of them."""
+    return max(10**k for k in range(RESOLUTIONS) if not (t_ns % 10**k).any())
+
+
+def _from_truth(readings: Inertial, truth: Trajectory | None, frame_t_ns: Times) -> Inertial:
+    """Without the readings before a truth that begins between the first one and the first frame:
+    the filter starts from its pose.
+    """
+    if truth is None or not readings.t_ns[0] < truth.t_ns[0] <= frame_t_ns[0]:
+        return readings
+    return readings.at(readings.t_ns >= truth.t_ns[0])
