@@ -61,6 +61,14 @@ class Seen:
         usable &= tau <= GAP_PERIODS * np.median(tau)
         return cls(in_body, variance, usable, tau)
 
+    def without(self, wrong: NDArray[np.bool_]) -> Seen:
+        """Without these frames."""
+        halves = None
+        if self.halves is not None:
+            one, two = (replace(half, usable=half.usable & ~wrong) for half in self.halves)
+            halves = (one, two)
+        return replace(self, usable=self.usable & ~wrong, halves=halves)
+
     def beside(self) -> Floats:
         """(k, 6) v and w as the frames beside tell them, each as far as it knows; NaN where none
         does. They have no picture in common with the pair itself, so that neither its noise is in
