@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from pelorus.console import progress
-from pelorus.converters import earth_start, twist_noise
+from pelorus.converters import earth_start, full_scale, repeated, twist_noise
 from pelorus.errors import PelorusError
-from pelorus.faults import stale
+from pelorus.faults import resolution, stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
 from pelorus.foreign import ForeignFileError
@@ -143,6 +143,11 @@ class Streams:
 
 def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     """`settings` are those of the tracker."""
+    return _made(streams, settings)[0]
+
+
+def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[Finding]]:
+    """The recording, and what was found in making it."""
     calibrated, frames = streams.calibrated, streams.frames
     t_ns = frames.t_ns
     if calibrated.rig is not None:
@@ -150,18 +155,28 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     _require_overlap(frames, t_ns, streams.motion)
     truth = None if streams.truth is None else _at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
-        header, tracks = _tracked(frames, calibrated, settings or Settings())
+        repeats = repeated.Repeats(streams.motion, t_ns)
+        header, tracks = _tracked(frames, calibrated, settings or Settings(), repeats)
+        t_ns = repeats.kept_t_ns
+        found = repeats.findings
     else:
         header, tracks, rig = calibrated.header, frames.tracks, calibrated.rig
+        t_ns, tracks, found = repeated.left_out(streams.motion, t_ns, tracks)
+        sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
+        if len(sizes) == 1:
+            _require_resolution(frames.where, tracks, sizes[0])
         if rig is not None:
             rig = _of_pixels(rig, tracks)
             rectification = rig.rectification()
             header = rig.header(rectification, header.name)
             tracks = _rectified(tracks, rectification, frames.where)
     made = _with_motion(header, streams, t_ns, tracks)
-    if len(made.inertial.t_ns):
+    if isinstance(streams.motion, Readings):
+        made, more = full_scale.with_ranges(made, streams.motion.inertial)
+        found = [*found, *more]
         made = replace(made, inertial=_from_truth(made.inertial, truth, t_ns))
-    return made if truth is None else made.with_truth(truth.t_ns, truth.poses)
+    made = made if truth is None else made.with_truth(truth.t_ns, truth.poses)
+    return made, found
 
 
 def converted(
@@ -172,13 +187,12 @@ def converted(
     `timing` overrides the calibration's. Without all six velocities only the tracks can be judged.
     An IMU's drive is judged, not mended.
     """
-    made = recording(found)
+    made, placed = _made(found, None)
     if timing is not None:
         made = made.with_header(twist_timing=timing)
-    placed = []
     if found.on_earth and found.truth is None:
         made, finding = earth_start.started(made)
-        placed = [finding]
+        placed = [*placed, finding]
     if not fix or not len(made.tracks):
         return made, placed
     if not isinstance(found.motion, Twists):
@@ -358,6 +372,14 @@ def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
     return rig.of_size(*min(holding, key=np.prod))
 
 
+def _require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> None:
+    words = resolution.beyond(tracks.pixels, size)
+    if words:
+        raise ForeignFileError(
+            where, words, due="the calibration of these pictures, or pixels of those, are due"
+        )
+
+
 def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tracks:
     """Of the pixels that the cameras took; without those that no ray of the lens reaches."""
     pixels = rectification.pixels(tracks.pixels)
@@ -372,7 +394,7 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
 
 
 def _tracked(
-    pictures: Pictures, calibrated: Calibrated, settings: Settings
+    pictures: Pictures, calibrated: Calibrated, settings: Settings, repeats: repeated.Repeats
 ) -> tuple[Header, Tracks]:
     """The HEADER of the rectified pictures, and the tracks in them."""
     pairs = pictures.read()
@@ -393,6 +415,8 @@ def _tracked(
         for pair in chain((first,), pairs):
             for where, picture in zip(pictures.where, pair, strict=True):
                 images.require_alike(where, picture, first[0])
+            if repeats.leaves_out(*pair):
+                continue
             yield pair if show is None else show(*pair)
 
     return header, track(

@@ -226,7 +226,8 @@ def _untold(frames: int) -> Fault:
 def _standing(seen: Seen, moved: Callable[[], Moving]) -> Iterator[Fault]:
     """A camera that stands tells noise, whatever is held against it."""
     if seen.moves < MOVES_SIGMAS and not moved().more_than_usual:
-        words = "the camera stands all along: axes, units, scale, clock and place cannot be judged"
+        how = "shakes for some time, and hardly moves" if seen.shakes else "stands all along"
+        words = f"the camera {how}: axes, units, scale, clock and place cannot be judged"
         yield Fault(UNTOLD, f"{words}. Drive, with turns", stops=False, grave=False)
 
 

@@ -22,6 +22,7 @@ LONGER = 0.02  # by which a focal length is changed to see what that does
 
 GAP_PERIODS = 5.0  # of a stream: where it pauses for longer nothing is known of the motion
 BLOCKS = 20
+SHAKES_D2, SHAKES_SHARE = 600.0, 0.02  # of six degrees of freedom, ten sigma; of the frames
 BESIDE = (2, 3)  # frames: the next ones share a picture
 
 
@@ -46,6 +47,14 @@ class Seen:
         own, told, trust = self.rates[good], beside[good], 1 / self.variance[good]
         noise = np.sum(told * (own - told) * trust, axis=1)
         return float(np.sum(told * own * trust)) / standard_error(noise)
+
+    @property
+    def shakes(self) -> bool:
+        """Whether some frames move by far more than their noise, be it to and fro from one to the
+        next.
+        """
+        d2 = np.sum(self.rates[self.usable] ** 2 / self.variance[self.usable], axis=1)
+        return bool(len(d2)) and float(np.mean(d2 > SHAKES_D2)) > SHAKES_SHARE
 
     @classmethod
     def of(cls, recording: Recording, views: TwoViews) -> Seen:

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Frames that repeat the one before: a driver that sends its last picture again under a new time.
+
+Such a frame says that the body stood for a moment. It is left out and counted. A camera that stands
+may show the same picture for long, where it has no noise (rendered ones): frames that repeat behind
+the first repeated one are kept while twists or gyro tell no motion.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.faults.finding import Finding
+from pelorus.motion import Times
+from pelorus.tracks import Tracks
+
+if TYPE_CHECKING:
+    from pelorus.converters.streams import Readings, Twists
+
+SUBJECT = "repeated frames"
+POINTS_LEAST = 3
+MANY = 0.02  # of the frames: told as a fault of the camera or the recorder
+MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
+
+
+class Repeats:
+    """Goes along with the pictures, pair by pair, and says which are left out."""
+
+    def __init__(self, motion: Twists | Readings, t_ns: Times) -> None:
+        self._t_ns = t_ns
+        self._moves = _moves(motion, t_ns)
+        self._before: tuple[NDArray[Any], NDArray[Any]] | None = None
+        self._in_a_row = 0
+        self._kept: list[int] = []
+        self._seen = 0
+
+    def leaves_out(self, left: NDArray[Any], right: NDArray[Any]) -> bool:
+        """Whether this pair, the next one, repeats the left or the right picture before."""
+        k, before = self._seen, self._before
+        self._seen, self._before = k + 1, (left, right)
+        same = before is not None and (
+            np.array_equal(before[0], left) or np.array_equal(before[1], right)
+        )
+        self._in_a_row = self._in_a_row + 1 if same else 0
+        out = same and (self._in_a_row == 1 or bool(self._moves[k]))
+        if not out:
+            self._kept.append(k)
+        return out
+
+    @property
+    def kept_t_ns(self) -> Times:
+        """Times of the pairs that are taken."""
+        return self._t_ns[self._kept]
+
+    @property
+    def findings(self) -> list[Finding]:
+        return _findings(self._seen - len(self._kept), self._seen)
+
+
+def left_out(
+    motion: Twists | Readings, t_ns: Times, tracks: Tracks
+) -> tuple[Times, Tracks, list[Finding]]:
+    """Times and tracks without the frames all of whose tracks, and no other ones, stand bit for bit
+    where they stood before.
+    """
+    count = tracks.frame_count
+    pairs = tracks.pairs(1)
+    same = (tracks.pixels[pairs.first] == tracks.pixels[pairs.second]).all(axis=1)
+    repeats = np.bincount(pairs.frame + 1, same, count + 1)[:count]
+    here = np.bincount(tracks.frame, minlength=count)
+    before = np.concatenate(([0], here[:-1]))
+    whole = (here >= POINTS_LEAST) & (repeats == here) & (before == here)
+    first = whole & ~np.concatenate(([False], whole[:-1]))
+    out = whole & (first | _moves(motion, t_ns))
+    if not out.any():
+        return t_ns, tracks, []
+    number = np.cumsum(~out) - 1
+    kept = ~out[tracks.frame]
+    less = Tracks(
+        int((~out).sum()), number[tracks.frame[kept]], tracks.id[kept], tracks.pixels[kept]
+    )
+    return t_ns[~out], less, _findings(int(out.sum()), count)
+
+
+def _findings(left: int, of: int) -> list[Finding]:
+    if not left:
+        return []
+    words = f"{left} of {of} frames repeat the picture before them, bit for bit"
+    return [Finding(SUBJECT, left > MANY * of, words, "left out", measured=left <= MANY * of)]
+
+
+def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
+    """Whether the body moves from the frame before to each: by its twists, or a gyro's turns."""
+    inertial = getattr(motion, "inertial", None)
+    if inertial is not None:
+        w = inertial.w_B_radps - np.median(inertial.w_B_radps, axis=0)
+        turned = _by_frames(inertial.t_ns, w, t_ns)
+        return np.linalg.norm(turned, axis=1) > TURNS_RAD
+    v = _by_frames(motion.t_ns, motion.v_B_mps, t_ns)
+    w = _by_frames(motion.t_ns, motion.w_B_radps, t_ns)
+    return (np.linalg.norm(v, axis=1) > MOVES_M) | (np.linalg.norm(w, axis=1) > TURNS_RAD)
+
+
+def _by_frames(own_ns: Times, rates: NDArray[np.float64], t_ns: Times) -> NDArray[np.float64]:
+    """(k, 3) what rates add up to from the frame before to each one."""
+    seconds = (own_ns - own_ns[0]) * 1e-9
+    steps = np.diff(seconds)[:, None]
+    summed = np.concatenate((np.zeros((1, 3)), np.cumsum(rates[:-1] * steps, axis=0)))
+    at = (t_ns - own_ns[0]) * 1e-9
+    there = np.stack([np.interp(at, seconds, column) for column in summed.T], axis=-1)
+    return np.diff(there, axis=0, prepend=there[:1])
