@@ -20,7 +20,7 @@ import numpy as np
 
 from pelorus import arrays, foreign, motion, se3, trajectory
 from pelorus.converters.streams import Asked, Pictures, Readings, Streams
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, resolved
 from pelorus.foreign import ForeignFileError
 from pelorus.inertial import Inertial
 from pelorus.motion import Times
@@ -48,7 +48,7 @@ def read(folder: Path, asked: Asked) -> Streams:
     """What the folder holds."""
     top = _top(folder)
     body = _of_body(top / IMU)
-    given, name = asked.calibration, folder.resolve().name
+    given, name = asked.calibration, resolved(folder).name
     of_imu = rig_files.are_of_imu(given)  # beside the folder's own cameras
     paths = given if given and not of_imu else _calibrations(top, given)
     calibrated = rig_files.read(paths, name, asked.extrinsic, asked.lens, asked.cameras)

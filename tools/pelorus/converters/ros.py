@@ -12,7 +12,7 @@ from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
 from pelorus.converters.ros_motion import IMU, Moving
 from pelorus.converters.streams import Asked, Readings, Streams, Twists
 from pelorus.converters.transforms import TF, Chain, Tree, bare
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, resolved
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import Rig
@@ -63,7 +63,7 @@ def _calibrated(
     remarks: list[str],
 ) -> tuple[Calibrated, Cameras]:
     """Of the files, else of the bag's camera_info; on the body as the files or /tf_static say."""
-    name = bag.path.resolve().stem
+    name = resolved(bag.path).stem
     if rig_files.is_own(asked.calibration):
         found = rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens)
         return found, ros_frames.chosen(bag, topics.cameras)
