@@ -58,7 +58,7 @@ def test_a_replay_writes_through_a_link_and_onto_standard_output(
     log, link, piped = (tmp_path / name for name in ("log.plr", "link.plr", "piped.plr"))
     log.write_bytes(b"old")
     link.symlink_to(log.name)
-    run(source, "--out", link, "--quiet", "--force")
+    run(source, "--out", link, "--quiet")
     assert link.is_symlink()
     with piped.open("wb") as stream:
         command = [str(program), str(source), "--out", "/dev/stdout", "--quiet"]
@@ -73,7 +73,7 @@ def test_a_recording_that_is_refused_leaves_an_earlier_result_alone(
 ) -> None:
     log = tmp_path / "log.plr"
     log.write_bytes(YESTERDAY)
-    refused = run(record(b"P6 640 480 255 " * 200), "--out", log, "--force", status=None)
+    refused = run(record(b"P6 640 480 255 " * 200), "--out", log, status=None)
     assert refused.status != OK
     assert log.read_bytes() == YESTERDAY
     assert not list(tmp_path.glob("*.part"))
@@ -88,10 +88,10 @@ def test_a_result_that_is_there_is_kept_unless_it_is_forced(
     kept.write_bytes(YESTERDAY)
     (tmp_path / "link").symlink_to(kept.name)
     source = record(drive())
-    refused = run(source, option, tmp_path / name, status=OUTPUT)
+    refused = run(source, option, tmp_path / name, status=OUTPUT, force=False)
     assert f"{tmp_path / name}: is there already; --force overwrites it" in refused.stderr
     assert kept.read_bytes() == YESTERDAY
     assert not list(tmp_path.glob("*.part"))
-    run(source, option, tmp_path / name, "--force", "--quiet")
+    run(source, option, tmp_path / name, "--quiet")
     assert kept.read_bytes() != YESTERDAY
     assert (tmp_path / "link").is_symlink()

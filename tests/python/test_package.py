@@ -55,6 +55,7 @@ def test_without_any_extra_a_sample_comes_to_its_report(tmp_path: Path) -> None:
         ("vision", "from pelorus.extras import cv2; cv2.blur"),
         ("vision", "from pelorus.tracking.images import unpacked; unpacked(Path(), b'')"),
         ("ros", "from pelorus.converters.bag import Bag; Bag(Path('/dev/null'))"),
+        ("px4", "from pelorus.extras import extra\nwith extra('pyulog'):\n    import pyulog"),
         ("geodetic", "from pelorus.converters.geodetic import Ground; Ground().system()"),
     ],
 )

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
 
-from pelorus.converters import geodetic, instances
+from pelorus.converters import geodetic, instances, ulog
 from pelorus.converters.geodetic import Ground
 from pelorus.errors import PelorusError
 from pelorus.table import TIME_UNITS, Table
@@ -96,7 +96,8 @@ class Columns:
 
     def read(self, path: Path, file: str) -> Table:
         """The file's columns under the project's names; `file` is its option's name."""
-        table = Table.read(path)
+        table = ulog.table(path, file) if ulog.is_one(path) else Table.read(path)
+        self.remarks += table.remarks
         table.hint_of, table.plain, table.remarks = _hint, PLAIN, self.remarks
         self.seen[path] = table.names
         for one in self.given:
