@@ -23,7 +23,7 @@ def readings(seed: int = 4) -> Floats:
     t = np.arange(COUNT)[:, None] / RATE_HZ
     smooth = np.sin(t * np.array([1.0, 1.3, 0.7, 2.1, 1.7, 0.9]))
     smooth[:, 2] += 9.8
-    return smooth + np.random.default_rng(seed).normal(0, 0.02, smooth.shape)
+    return np.asarray(smooth + np.random.default_rng(seed).normal(0, 0.02, smooth.shape))
 
 
 def written(folder: Path, time: str, rows: list[tuple[object, ...]], more: str = "") -> Path:

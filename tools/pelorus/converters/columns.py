@@ -97,7 +97,7 @@ class Columns:
     def read(self, path: Path, file: str) -> Table:
         """The file's columns under the project's names; `file` is its option's name."""
         table = ulog.table(path, file) if ulog.is_one(path) else Table.read(path)
-        self.remarks += table.remarks
+        self.remarks.extend(table.remarks)
         table.hint_of, table.plain, table.remarks = _hint, PLAIN, self.remarks
         self.seen[path] = table.names
         for one in self.given:
@@ -136,17 +136,15 @@ def _name_bracketed(table: Table) -> None:
     of turn, specific forces.
     """
     for column in table.names:
-        found = BRACKETED.fullmatch(column)
-        for letter, base in BASES.items() if found else ():
-            name = base.fullmatch(found["base"])
-            target, units = (
-                NAMES[letter + ("" if letter == "t" else name["axis"])] if name else ("", {})
-            )
-            unit = _unit_in(column)
-            if unit not in units:
+        bracketed = BRACKETED.fullmatch(column)
+        for letter, base in BASES.items() if bracketed else ():
+            found = base.fullmatch(bracketed["base"]) if bracketed else None
+            if found is None:
                 continue
+            unit, axis = _unit_in(column), found.groupdict().get("axis", "")
+            target, units = NAMES[letter + axis]
             own = f"t_{unit}" if letter == "t" else target
-            if own not in table.names:
+            if unit in units and own not in table.names:
                 table.rename(column, own, 1.0 if letter == "t" else units[unit])
 
 

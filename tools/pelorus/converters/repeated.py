@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.faults.finding import Finding
+from pelorus.faults.two_views import two_views
+from pelorus.frames import Camera
 from pelorus.motion import Times
 from pelorus.tracks import Tracks
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
 SUBJECT = "repeated frames"
 POINTS_LEAST = 3
+FITS_D2, LIKE = 25.0, 0.7  # of three degrees of freedom; of the share elsewhere
 MANY = 0.02  # of the frames: told as a fault of the camera or the recorder
 MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
 
@@ -61,10 +64,11 @@ class Repeats:
 
 
 def left_out(
-    motion: Twists | Readings, t_ns: Times, tracks: Tracks
+    motion: Twists | Readings, t_ns: Times, tracks: Tracks, camera: Camera
 ) -> tuple[Times, Tracks, list[Finding]]:
     """Times and tracks without the frames all of whose tracks, and no other ones, stand bit for bit
-    where they stood before.
+    where they stood before; if behind them the tracks follow the same points as before, and not
+    others (faults.stale).
     """
     count = tracks.frame_count
     pairs = tracks.pairs(1)
@@ -75,7 +79,7 @@ def left_out(
     whole = (here >= POINTS_LEAST) & (repeats == here) & (before == here)
     first = whole & ~np.concatenate(([False], whole[:-1]))
     out = whole & (first | _moves(motion, t_ns))
-    if not out.any():
+    if not out.any() or not _go_on(tracks, camera, np.nonzero(out)[0]):
         return t_ns, tracks, []
     number = np.cumsum(~out) - 1
     kept = ~out[tracks.frame]
@@ -83,6 +87,15 @@ def left_out(
         int((~out).sum()), number[tracks.frame[kept]], tracks.id[kept], tracks.pixels[kept]
     )
     return t_ns[~out], less, _findings(int(out.sum()), count)
+
+
+def _go_on(tracks: Tracks, camera: Camera, repeats: NDArray[np.intp]) -> bool:
+    """Whether the points before and behind the repeated frames are one rigid scene as elsewhere."""
+    views = two_views(tracks, camera, 2)
+    across = np.isin(tracks.frame[views.first], repeats - 1)
+    if across.sum() < POINTS_LEAST or across.all():
+        return True
+    return bool(np.mean(views.d2[across] < FITS_D2) > LIKE * np.mean(views.d2[~across] < FITS_D2))
 
 
 def _findings(left: int, of: int) -> list[Finding]:

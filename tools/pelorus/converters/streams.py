@@ -161,7 +161,6 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
         found = repeats.findings
     else:
         header, tracks, rig = calibrated.header, frames.tracks, calibrated.rig
-        t_ns, tracks, found = repeated.left_out(streams.motion, t_ns, tracks)
         sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
         if len(sizes) == 1:
             _require_resolution(frames.where, tracks, sizes[0])
@@ -170,6 +169,7 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
             rectification = rig.rectification()
             header = rig.header(rectification, header.name)
             tracks = _rectified(tracks, rectification, frames.where)
+        t_ns, tracks, found = repeated.left_out(streams.motion, t_ns, tracks, header.camera)
     made = _with_motion(header, streams, t_ns, tracks)
     if isinstance(streams.motion, Readings):
         made, more = full_scale.with_ranges(made, streams.motion.inertial)

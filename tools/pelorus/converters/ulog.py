@@ -8,6 +8,8 @@ right and down, times PX4's own, in us.
 
 from __future__ import annotations
 
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +37,8 @@ def table(path: Path, file: str) -> Table:
     with extra("pyulog"):
         from pyulog import ULog  # noqa: PLC0415 - an extra
     try:
-        log = ULog(str(path), [COMBINED, SUMMED])
+        with redirect_stdout(StringIO()):  # it prints what it thinks of a damaged file
+            log = ULog(str(path), [COMBINED, SUMMED])
     except Exception as error:  # it raises a dozen kinds on damaged files
         words = (str(error).splitlines() or [type(error).__name__])[0]
         raise ForeignFileError(path, f"cannot be read as a ULog: {words}") from error

@@ -10,12 +10,13 @@ off by depends on the place in the picture alone, and is fitted beside it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from pelorus.faults.fault import Fault
 from pelorus.faults.seen import standard_error
+from pelorus.frames import Camera
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
@@ -55,14 +56,6 @@ class Apart:
         )
 
 
-class Camera(Protocol):
-    """The numbers that are needed of it."""
-
-    fx_px: float
-    cx_px: float
-    cy_px: float
-
-
 def apart(recording: Recording) -> Apart | None:
     """None with too little to tell by.
 
@@ -88,7 +81,8 @@ def apart(recording: Recording) -> Apart | None:
         weight = (np.abs(left) < WITHIN_SIGMAS * sigma).astype(np.float64)
     if weight.sum() < ROWS_LEAST or power <= 0:
         return None
-    by_frame = np.bincount(tracks.frame[at], weight * told * left, tracks.frame_count)
+    noise = weight * told * left
+    by_frame = np.bincount(tracks.frame[at], noise, tracks.frame_count).astype(np.float64)
     speed = float(np.sqrt(np.average(near.rows[at] ** 2 + near.columns[at] ** 2, weights=weight)))
     return Apart(by_s, standard_error(by_frame) / power, abs(by_s) * speed)
 

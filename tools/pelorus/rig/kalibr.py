@@ -72,7 +72,7 @@ def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
     names = [name for name in content.content if CAMERA.fullmatch(str(name))]
     cameras = [content.object(name) for name in sorted(names, key=lambda name: int(name[3:]))]
     if len(cameras) == 2 and not asked:
-        return pair(*cameras)
+        return pair(cameras[0], cameras[1])
     known = [
         several.Camera((camera.at, str(camera.content.get("rostopic", ""))), _lens(camera), T)
         for camera, T in zip(cameras, _chained(cameras), strict=True)
