@@ -14,14 +14,16 @@ from drives import at_rest, clean, with_stale_tracks
 from imu_drives import NOISY, noisy, options
 from numpy.typing import NDArray
 from pelorus.converters import full_scale, repeated
-from pelorus.converters.streams import Readings, Seen, Streams, Twists, recording
+from pelorus.converters.streams import Readings, Seen, Streams, Twists, _moves, recording
 from pelorus.faults import platform, resolution, sync
-from pelorus.faults.geometry import _at_times
+from pelorus.faults.geometry import WORLD_SURE, _at_times, _in_world
 from pelorus.faults.imu_axes import _units
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.named import _beside_way, _pixels, _times
 from pelorus.faults.seen import Seen as SeenMotion
+from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import two_views
+from pelorus.faults.world_axes import world_axes
 from pelorus.foreign import ForeignFileError
 from pelorus.inertial import Inertial
 from pelorus.recording import Recording
@@ -185,7 +187,7 @@ def test_frames_that_repeat_are_left_out_and_counted(
     assert not set(drive.frame_t_ns[out].tolist()) & set(t_ns.tolist())
     assert findings[0].found  # one in fifteen is many
     assert f"{len(out)} of {len(rows)} frames repeat" in findings[0].evidence
-    given = (found.motion, drive.frame_t_ns)
+    given = (_moves(found.motion, drive.frame_t_ns), drive.frame_t_ns)
     assert repeated.left_out(*given, tracks, drive.header.camera)[2] == []
     other, _ = with_stale_tracks(drive, range(10, 14))  # of other points from there on
     assert repeated.left_out(*given, other.tracks, drive.header.camera)[2] == []
@@ -195,18 +197,18 @@ def test_pictures_that_repeat_are_left_out_but_not_those_of_a_body_that_stands()
     drive = clean()
     chance = np.random.default_rng(1)
     pictures = chance.integers(0, 255, (len(drive.frame_t_ns), 4, 4))
-    moving = repeated.Repeats(streams(drive).motion, drive.frame_t_ns)
+    moving = repeated.Repeats(_moves(streams(drive).motion, drive.frame_t_ns), drive.frame_t_ns)
     shown = [k - 1 if k in (5, 6, 20) else k for k in range(len(pictures))]
     shown[6] = 4  # twice in a row
     out = [k for k, of in enumerate(shown) if moving.leaves_out(pictures[of], pictures[of])]
     assert out == [5, 6, 20]
-    right = repeated.Repeats(streams(drive).motion, drive.frame_t_ns)
+    right = repeated.Repeats(_moves(streams(drive).motion, drive.frame_t_ns), drive.frame_t_ns)
     out = [
         k for k, of in enumerate(shown) if right.leaves_out(pictures[k], pictures[of])
     ]  # the right one alone
     assert out == [5, 6, 20]
     still = at_rest()
-    standing = repeated.Repeats(streams(still).motion, still.frame_t_ns)
+    standing = repeated.Repeats(_moves(streams(still).motion, still.frame_t_ns), still.frame_t_ns)
     out = [k for k in range(len(still.frame_t_ns)) if standing.leaves_out(*pictures[:2])]
     assert len(out) <= 1
 
@@ -285,3 +287,18 @@ def test_a_pause_that_no_track_spans_cannot_be_told() -> None:
     told = _beside_way(gaps[0], less, views, less.twist_t_ns)
     assert "how far the camera goes in them cannot be told" in told.words
     assert "0 m" not in told.words
+
+
+def test_wheels_that_stand_while_the_robot_is_lifted_have_no_axes() -> None:
+    drive = clean(duration_s=20.0)
+    views = two_views(drive.tracks, drive.header.camera, 1)
+    seen = SeenMotion.of(drive, views)
+    chance = np.random.default_rng(5)
+    still = chance.normal(0, 1e-3, drive.v_B_mps.shape)
+    lifted_robot = replace(drive, v_B_mps=still, w_B_radps=np.zeros_like(still))
+    assert world_axes(lifted_robot, seen) == 0.0
+    R = TwistBody(drive).at((drive.twist_t_ns - drive.twist_t_ns[0]) * 1e-9).R
+    turned = replace(drive, v_B_mps=np.einsum("kij,kj->ki", R, drive.v_B_mps))
+    assert world_axes(turned, seen) > WORLD_SURE
+    fault = _in_world(turned, seen)[0]
+    assert "--twist-in world" in fault.words  # the remedy beside the cause

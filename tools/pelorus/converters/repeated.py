@@ -3,12 +3,12 @@
 
 Such a frame says that the body stood for a moment. It is left out and counted. A camera that stands
 may show the same picture for long, where it has no noise (rendered ones): frames that repeat behind
-the first repeated one are kept while twists or gyro tell no motion.
+the first repeated one are kept while twists or gyro tell no motion (`moves`).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from pelorus.faults.finding import Finding
 from pelorus.faults.two_views import two_views
 from pelorus.frames import Camera
+from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.tracks import Tracks
 
-if TYPE_CHECKING:
-    from pelorus.converters.streams import Readings, Twists
-
+Flags = NDArray[np.bool_]
 SUBJECT = "repeated frames"
 POINTS_LEAST = 3
 FITS_D2, LIKE = 25.0, 0.7  # of three degrees of freedom; of the share elsewhere
@@ -32,9 +31,9 @@ MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
 class Repeats:
     """Goes along with the pictures, pair by pair, and says which are left out."""
 
-    def __init__(self, motion: Twists | Readings, t_ns: Times) -> None:
+    def __init__(self, moves: Flags, t_ns: Times) -> None:
         self._t_ns = t_ns
-        self._moves = _moves(motion, t_ns)
+        self._moves = moves
         self._before: tuple[NDArray[Any], NDArray[Any]] | None = None
         self._in_a_row = 0
         self._kept: list[int] = []
@@ -64,7 +63,7 @@ class Repeats:
 
 
 def left_out(
-    motion: Twists | Readings, t_ns: Times, tracks: Tracks, camera: Camera
+    moves: Flags, t_ns: Times, tracks: Tracks, camera: Camera
 ) -> tuple[Times, Tracks, list[Finding]]:
     """Times and tracks without the frames all of whose tracks, and no other ones, stand bit for bit
     where they stood before; if behind them the tracks follow the same points as before, and not
@@ -78,7 +77,7 @@ def left_out(
     before = np.concatenate(([0], here[:-1]))
     whole = (here >= POINTS_LEAST) & (repeats == here) & (before == here)
     first = whole & ~np.concatenate(([False], whole[:-1]))
-    out = whole & (first | _moves(motion, t_ns))
+    out = whole & (first | moves)
     if not out.any() or not _go_on(tracks, camera, np.nonzero(out)[0]):
         return t_ns, tracks, []
     number = np.cumsum(~out) - 1
@@ -105,19 +104,17 @@ def _findings(left: int, of: int) -> list[Finding]:
     return [Finding(SUBJECT, left > MANY * of, words, "left out", measured=left <= MANY * of)]
 
 
-def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
-    """Whether the body moves from the frame before to each: by its twists, or a gyro's turns."""
-    inertial = getattr(motion, "inertial", None)
-    if inertial is not None:
-        w = inertial.w_B_radps - np.median(inertial.w_B_radps, axis=0)
-        turned = _by_frames(inertial.t_ns, w, t_ns)
-        return np.linalg.norm(turned, axis=1) > TURNS_RAD
-    v = _by_frames(motion.t_ns, motion.v_B_mps, t_ns)
-    w = _by_frames(motion.t_ns, motion.w_B_radps, t_ns)
-    return (np.linalg.norm(v, axis=1) > MOVES_M) | (np.linalg.norm(w, axis=1) > TURNS_RAD)
+def moves(t_ns: Times, own_ns: Times, turns: Floats, speeds: Floats | None) -> Flags:
+    """Whether the body moves from the frame before to each: by the rates of turn of its gyro or its
+    twists, and by their velocities.
+    """
+    out = np.linalg.norm(_by_frames(own_ns, turns, t_ns), axis=1) > TURNS_RAD
+    if speeds is not None:
+        out |= np.linalg.norm(_by_frames(own_ns, speeds, t_ns), axis=1) > MOVES_M
+    return np.asarray(out, np.bool_)
 
 
-def _by_frames(own_ns: Times, rates: NDArray[np.float64], t_ns: Times) -> NDArray[np.float64]:
+def _by_frames(own_ns: Times, rates: Floats, t_ns: Times) -> Floats:
     """(k, 3) what rates add up to from the frame before to each one."""
     seconds = (own_ns - own_ns[0]) * 1e-9
     steps = np.diff(seconds)[:, None]

@@ -15,6 +15,7 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.console import progress
 from pelorus.converters import earth_start, full_scale, repeated, twist_noise
@@ -155,7 +156,7 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
     _require_overlap(frames, t_ns, streams.motion)
     truth = None if streams.truth is None else _at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
-        repeats = repeated.Repeats(streams.motion, t_ns)
+        repeats = repeated.Repeats(_moves(streams.motion, t_ns), t_ns)
         header, tracks = _tracked(frames, calibrated, settings or Settings(), repeats)
         t_ns = repeats.kept_t_ns
         found = repeats.findings
@@ -169,7 +170,8 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
             rectification = rig.rectification()
             header = rig.header(rectification, header.name)
             tracks = _rectified(tracks, rectification, frames.where)
-        t_ns, tracks, found = repeated.left_out(streams.motion, t_ns, tracks, header.camera)
+        moves = _moves(streams.motion, t_ns)
+        t_ns, tracks, found = repeated.left_out(moves, t_ns, tracks, header.camera)
     made = _with_motion(header, streams, t_ns, tracks)
     if isinstance(streams.motion, Readings):
         made, more = full_scale.with_ranges(made, streams.motion.inertial)
@@ -343,6 +345,14 @@ def _times_of(motion: Twists | Readings) -> Times:
     return motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
 
 
+def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
+    """Whether the body moves from the frame before to each; by an IMU, whether it turns."""
+    if isinstance(motion, Twists):
+        return repeated.moves(t_ns, motion.t_ns, motion.w_B_radps, motion.v_B_mps)
+    w = motion.inertial.w_B_radps
+    return repeated.moves(t_ns, motion.inertial.t_ns, w - np.median(w, axis=0), None)
+
+
 def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Readings) -> None:
     own = _times_of(motion)
     if t_ns[-1] < own[0] or own[-1] < t_ns[0]:
@@ -449,7 +459,7 @@ def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) 
 
 def _resolution_ns(t_ns: Times) -> int:
     """To what the stamps were rounded: the largest power of ten that divides all of them."""
-    return max(10**k for k in range(RESOLUTIONS) if not (t_ns % 10**k).any())
+    return max(int(10**k) for k in range(RESOLUTIONS) if not (t_ns % 10**k).any())
 
 
 def _from_truth(readings: Inertial, truth: Trajectory | None, frame_t_ns: Times) -> Inertial:

@@ -65,9 +65,9 @@ def _numbers(path: Path, name: str, data: dict[str, Any]) -> dict[str, list[floa
     lacking = [field for field in ("timestamp", *needed) if field not in data]
     if lacking:
         raise ForeignFileError(path, f"{name} lacks {', '.join(lacking)}")
-    seconds = {turned: 1.0, forced: 1.0}
+    seconds = {field: np.ones(len(data["timestamp"])) for field in (turned, forced)}
     if name == SUMMED:
-        seconds = {field: np.asarray(data[f"{field}_dt"], float) * 1e-6 for field in seconds}
+        seconds = {field: np.asarray(data[f"{field}_dt"], np.float64) * 1e-6 for field in seconds}
     out: dict[str, list[float | int]] = {"t_us": np.asarray(data["timestamp"]).tolist()}
     for field, short, unit in ((turned, "w", "radps"), (forced, "a", "mps2")):
         for k, axis in enumerate(AXES):
