@@ -164,8 +164,7 @@ static bool open_outputs(replay *run) {
     const replay_options *o = &run->options;
     if (o->print_config)
         return true; /* nothing is computed */
-    return result_file_open(&run->trajectory, o->trajectory, o->input, o->force) &&
-           open_log(run);
+    return result_file_open(&run->trajectory, o->trajectory, o->input, o->force) && open_log(run);
 }
 
 static bool close_outputs(replay *run) {
