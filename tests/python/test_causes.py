@@ -179,15 +179,14 @@ def test_frames_that_repeat_are_left_out_and_counted(
     frame = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
     stale = Tracks(tracks.frame_count, frame, tracks.id[at], tracks.pixels[at])
     found = streams(replace(drive, tracks=stale))
-    t_ns, kept, findings = repeated.left_out(
-        found.motion, drive.frame_t_ns, stale, drive.header.camera
-    )
+    moves = _moves(found.motion, drive.frame_t_ns)
+    t_ns, kept, findings = repeated.left_out(moves, drive.frame_t_ns, stale, drive.header.camera)
     out = [k for k in range(len(rows)) if k % every == every - 1]
     assert len(t_ns) == kept.frame_count == len(rows) - len(out)
     assert not set(drive.frame_t_ns[out].tolist()) & set(t_ns.tolist())
     assert findings[0].found  # one in fifteen is many
     assert f"{len(out)} of {len(rows)} frames repeat" in findings[0].evidence
-    given = (_moves(found.motion, drive.frame_t_ns), drive.frame_t_ns)
+    given = (moves, drive.frame_t_ns)
     assert repeated.left_out(*given, tracks, drive.header.camera)[2] == []
     other, _ = with_stale_tracks(drive, range(10, 14))  # of other points from there on
     assert repeated.left_out(*given, other.tracks, drive.header.camera)[2] == []
