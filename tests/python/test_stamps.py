@@ -60,6 +60,9 @@ def test_a_clock_that_was_set_back_by_anything_else_is_no_counter() -> None:
     assert not stamps.unwrapped(np.arange(100) * 5_000_000).wraps
     late = np.array([2**32 - 8000, 2**32 - 4000, 700_000_000, 700_004_000]) * 1000
     assert not stamps.unwrapped(late).wraps  # it starts again, and 700 s later
+    shuffled = np.random.default_rng(1).permutation(np.arange(160) * 100_000_000)
+    assert not stamps.unwrapped(shuffled).wraps
+    assert not stamps.unwrapped(np.tile(np.arange(60) * 100_000_000, 9)).wraps
 
 
 @pytest.mark.parametrize("batch", [2, 7, 16])

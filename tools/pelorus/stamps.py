@@ -17,6 +17,7 @@ from pelorus.motion import Times
 
 BITS, UNITS_NS = (32, 24, 16), {"us": 1_000, "ms": 1_000_000, "ns": 1}
 STEPS_MAX = 10.0  # times the usual step, that the step across a wrap may have
+STEPS_LEAST = 1000  # usual steps of a period
 PAUSE = 5.0  # times the usual interval between batches: readings are not spread across a pause
 
 
@@ -37,7 +38,8 @@ class Unwrapped(NamedTuple):
 def unwrapped(t_ns: Times) -> Unwrapped:
     """Returns the times of a counter that starts again at 0, or the same times if none fits.
 
-    Each step back must be the counter's whole period less a usual step.
+    Each step back must be the counter's whole period less a usual step, which is a small part of the
+    period: rows in no order of time are no counter.
     """
     steps = np.diff(t_ns)
     back, ahead = steps < 0, steps[steps > 0]
@@ -47,6 +49,8 @@ def unwrapped(t_ns: Times) -> Unwrapped:
     for (unit, unit_ns), bits in product(UNITS_NS.items(), BITS):
         period_ns = unit_ns << bits
         across = steps[back] + period_ns
+        if usual_ns * STEPS_LEAST > period_ns:
+            continue
         if t_ns.max() < period_ns and across.min() > 0 and across.max() <= STEPS_MAX * usual_ns:
             turns = np.concatenate(([0], np.cumsum(back)))
             return Unwrapped(t_ns + turns * period_ns, int(back.sum()), bits, unit)
