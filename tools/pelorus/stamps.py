@@ -38,7 +38,7 @@ class Unwrapped(NamedTuple):
 def unwrapped(t_ns: Times) -> Unwrapped:
     """Returns the times of a counter that starts again at 0, or the same times if none fits.
 
-    Each step back must be the counter's whole period less a usual step, which is a small part of the
+    Each step back must be the whole period less a usual step, which is a small part of the
     period: rows in no order of time are no counter.
     """
     steps = np.diff(t_ns)
