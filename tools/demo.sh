@@ -42,7 +42,7 @@ if [ -z "$recording" ]; then
 fi
 
 heading 'Replaying it (float32, what the robot runs)'
-build/bin/pelorus-replay "$recording" --trajectory out/trajectory.tum --out out/log.plr
+build/bin/pelorus-replay "$recording" --trajectory out/trajectory.tum --out out/log.plr --force
 "$VENV/bin/pelorus" export out/log.plr --map out/map.ply --force
 
 heading 'Drawing the report'

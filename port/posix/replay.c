@@ -150,7 +150,7 @@ static bool open_log(replay *run) {
                 o->out);
         return false;
     }
-    if (!result_file_open(&run->out, o->out, o->input))
+    if (!result_file_open(&run->out, o->out, o->input, o->force))
         return false;
     run->port.output = run->out.file;
     if (packed)
@@ -164,7 +164,7 @@ static bool open_outputs(replay *run) {
     const replay_options *o = &run->options;
     if (o->print_config)
         return true; /* nothing is computed */
-    return result_file_open(&run->trajectory, o->trajectory, o->input) && open_log(run);
+    return result_file_open(&run->trajectory, o->trajectory, o->input, o->force) && open_log(run);
 }
 
 static bool close_outputs(replay *run) {
@@ -281,13 +281,14 @@ static void read_recording(replay *run) {
 
 /* --- what it came to --- */
 
-static bool print_results(replay *run) {
+/* A log that could not be written is not recommended. */
+static bool print_results(replay *run, bool written) {
     const replay_options *o = &run->options;
     const char *path = o->input;
     if (o->json)
         summary_print_json(&run->summary, &run->session, path);
     else if (!o->quiet)
-        summary_print(&run->summary, &run->session, path, o->out);
+        summary_print(&run->summary, &run->session, path, written ? o->out : NULL);
     if (fflush(stdout) == 0 && !ferror(stdout))
         return true;
     fprintf(stderr, PELORUS_NAME ": standard output: %s\n", strerror(errno));
@@ -325,7 +326,7 @@ static int run_recording(replay *run) {
         written = close_outputs(run); /* a summary that nobody reads ends the program */
     if (status == REPLAY_EXIT_OK)
         status = verdict_on_frames(run->options.input, &run->session, &run->summary);
-    const bool printed = status != REPLAY_EXIT_OK || print_results(run);
+    const bool printed = status != REPLAY_EXIT_OK || print_results(run, written);
     const bool complete = memory_sufficed(run);
     const int kept = storage_verdict_on_save(&run->storage, &run->options);
     if (status == REPLAY_EXIT_OK && !(printed && written && complete))

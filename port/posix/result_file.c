@@ -32,7 +32,8 @@ static bool choose_part(result_file *result) {
     return false;
 }
 
-bool result_file_open(result_file *result, const char *path, const char *input_path) {
+bool result_file_open(result_file *result, const char *path, const char *input_path,
+                      bool overwrite) {
     result->path = path;
     result->file = NULL;
     if (path == NULL)
@@ -41,6 +42,10 @@ bool result_file_open(result_file *result, const char *path, const char *input_p
     if (system_same_file(path, input_path) ||
         (chosen && system_same_file(result->part, input_path))) {
         fprintf(stderr, PELORUS_NAME ": %s: is the recording itself; give another path\n", path);
+        return false;
+    }
+    if (!overwrite && system_output_at(path) == SYSTEM_FILE) {
+        fprintf(stderr, PELORUS_NAME ": %s: is there already; --force overwrites it\n", path);
         return false;
     }
     if (chosen && result->part[0] != '\0')

@@ -20,8 +20,10 @@ typedef struct result_file {
     char part[RESULT_PATH_SIZE];   /* where the bytes go until then; empty: into `path` itself */
 } result_file;
 
-/* Makes the file NAME.part. Refuses the input itself. On failure says so on stderr. */
-bool result_file_open(result_file *result, const char *path, const char *input_path);
+/* Makes the file NAME.part. Refuses the input itself, and a file that is there unless `overwrite`.
+ * On failure says so on stderr. */
+bool result_file_open(result_file *result, const char *path, const char *input_path,
+                      bool overwrite);
 
 /* Writes out what is buffered, closes, and gives the file its name. On failure, also an earlier
  * one, says so on stderr. */

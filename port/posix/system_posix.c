@@ -30,7 +30,7 @@ static void remove_unfinished(int signal) {
 
 /* Those that are ignored, as by nohup, stay so. */
 static void remove_at_signals(void) {
-    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU, SIGXFSZ};
     struct sigaction action = {.sa_handler = remove_unfinished};
     action.sa_flags = (int)SA_RESETHAND; /* raised anew it is not caught */
     (void)sigemptyset(&action.sa_mask);

@@ -31,7 +31,15 @@ SLOTS = 50
 
 def by_program(recording: Path, log: Path) -> tuple[list[Message], Floats]:
     """Its log, and us of each frame."""
-    command = [find_programs(None).float32, recording, f"--slots={SLOTS}", "--quiet", "--out", log]
+    command = [
+        find_programs(None).float32,
+        recording,
+        f"--slots={SLOTS}",
+        "--quiet",
+        "--force",
+        "--out",
+        log,
+    ]
     subprocess.run([*map(str, command)], check=True)
     found = messages_of(log)
     return found, np.array([m.update_us for m in found if isinstance(m, Report)], float)

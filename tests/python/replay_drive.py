@@ -149,12 +149,16 @@ def run(
     program: str = "pelorus-replay",
     stdin: bytes = b"",
     status: int | None = OK,
+    force: bool = True,
 ) -> Result:
-    """Run the program, which must end with that status; None: with any, but no crash."""
+    """Run the program, which must end with that status; None: with any, but no crash. A test may
+    write its files anew.
+    """
     path = BIN / program
     if not path.exists():
         pytest.skip(f"{path} is not built")
-    command = [str(path), *map(str, arguments)]
+    writes = force and any(option in arguments for option in ("--out", "--trajectory"))
+    command = [str(path), *map(str, arguments), *(["--force"] if writes else [])]
     done = subprocess.run(command, input=stdin, capture_output=True, check=False, timeout=1800)
     assert done.returncode >= 0, f"killed by signal {-done.returncode}"
     result = Result(done.returncode, done.stdout.decode(), done.stderr.decode())

@@ -27,7 +27,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from PIL import Image
 from rendered import BEGIN_NS, FRAMES, HEIGHT, SPEED_MPS, WIDTH, Scene
-from rigs import RADTAN, Cameras, camchain, write_yaml
+from rigs import IMU_NOISE, RADTAN, Cameras, camchain, write_yaml
 from test_convert_csv import csv_files
 from test_convert_euroc import assert_on_surfaces
 
@@ -221,6 +221,10 @@ def test_camera_info_and_tf_static_need_no_other_file(
     assert ("the right camera stands as /tf_static says: a - b" in said) is baseline_by_tf
     assert ("/left/image_raw stands on the right: taken as" in said) is not baseline_by_tf
     assert_on_surfaces(target)
+    imu = write_yaml(tmp_path / "imu.yaml", {"imu0": IMU_NOISE | {"time_offset": 0.0}})
+    again = tmp_path / "again.plr"
+    pelorus("convert", "ros", bag, again, *words, "--calibration", imu)
+    assert messages_of(again, Header)[0].camera == messages_of(target, Header)[0].camera
 
 
 def test_the_frame_of_rectified_pictures_is_turned_as_camera_info_says(

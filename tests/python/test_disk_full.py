@@ -37,13 +37,15 @@ def test_a_replay_that_finds_the_disk_full_leaves_what_was_there(
         (folder / "link.plr").symlink_to(log.name)
     there = sorted(folder.iterdir())
     done = subprocess.run(
-        [str(program), str(record(drive())), "--out", str(folder / name), "--quiet"],
+        [str(program), str(record(drive())), "--out", str(folder / name), "--force"],
         capture_output=True,
         check=False,
         preexec_fn=short_of_room,
     )
     assert done.returncode == OUTPUT
     assert b"not wholly written" in done.stderr
+    assert b"give --out LOG.plr" in done.stdout  # not the log that is not there
+    assert name.encode() not in done.stdout
     assert sorted(folder.iterdir()) == there
     if before is not None:
         assert log.read_bytes() == before
@@ -71,6 +73,25 @@ def test_a_recording_that_is_refused_leaves_an_earlier_result_alone(
 ) -> None:
     log = tmp_path / "log.plr"
     log.write_bytes(YESTERDAY)
-    assert run(record(b"P6 640 480 255 " * 200), "--out", log, status=None).status != OK
+    refused = run(record(b"P6 640 480 255 " * 200), "--out", log, status=None)
+    assert refused.status != OK
     assert log.read_bytes() == YESTERDAY
     assert not list(tmp_path.glob("*.part"))
+
+
+@pytest.mark.parametrize("option", ["--out", "--trajectory"])
+@pytest.mark.parametrize("name", ["result", "link"])
+def test_a_result_that_is_there_is_kept_unless_it_is_forced(
+    record: Record, tmp_path: Path, option: str, name: str
+) -> None:
+    kept = tmp_path / "result"
+    kept.write_bytes(YESTERDAY)
+    (tmp_path / "link").symlink_to(kept.name)
+    source = record(drive())
+    refused = run(source, option, tmp_path / name, status=OUTPUT, force=False)
+    assert f"{tmp_path / name}: is there already; --force overwrites it" in refused.stderr
+    assert kept.read_bytes() == YESTERDAY
+    assert not list(tmp_path.glob("*.part"))
+    run(source, option, tmp_path / name, "--quiet")
+    assert kept.read_bytes() != YESTERDAY
+    assert (tmp_path / "link").is_symlink()

@@ -91,6 +91,7 @@ def test_pip_puts_the_replay_on_the_path() -> None:
         ("vision", "from pelorus.extras import cv2; cv2.blur"),
         ("vision", "from pelorus.tracking.images import unpacked; unpacked(Path(), b'')"),
         ("ros", "from pelorus.converters.bag import Bag; Bag(Path('/dev/null'))"),
+        ("px4", "from pelorus.extras import extra\nwith extra('pyulog'):\n    import pyulog"),
         ("geodetic", "from pelorus.converters.geodetic import Ground; Ground().system()"),
     ],
 )

@@ -12,7 +12,7 @@ import pytest
 from replay_drive import BIN, drive, encode
 
 WAIT_S = 60.0  # of a loaded machine; in fact milliseconds
-LEAVING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+LEAVING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU)
 
 
 def begun(folder: Path, *before: str) -> subprocess.Popen[bytes]:
@@ -20,7 +20,14 @@ def begun(folder: Path, *before: str) -> subprocess.Popen[bytes]:
     program = BIN / "pelorus-replay"
     if not program.exists():
         pytest.skip(f"{program} is not built")
-    outputs = ("--quiet", "--out", str(folder / "log.plr"), "--trajectory", str(folder / "t.tum"))
+    outputs = (
+        "--quiet",
+        "--force",
+        "--out",
+        str(folder / "log.plr"),
+        "--trajectory",
+        str(folder / "t.tum"),
+    )
     first = ("env", "--default-signal=HUP")  # the tests may run under nohup themselves
     replay = subprocess.Popen([*first, *before, str(program), "-", *outputs], stdin=subprocess.PIPE)
     assert replay.stdin

@@ -177,3 +177,12 @@ def test_two_topics_that_differ_in_the_cameras_word_alone_are_the_pair(
         except PelorusError as error:
             outcome = str(error)
     assert found in outcome
+
+
+@pytest.mark.parametrize(("apart_ms", "told"), [(0.4, False), (2.5, False), (-11.0, True)])
+def test_pairs_that_are_some_ms_apart_are_remarked(apart_ms: float, told: bool) -> None:
+    left = NS + np.arange(50) * 50_000_000
+    words = ros_frames.apart_words(np.stack((left, left + round(apart_ms * 1e6)), axis=-1))
+    assert bool(words) is told
+    if told:
+        assert "are 11 ms apart in the median, up to 11 ms, the left ones later" in words[0]

@@ -18,6 +18,7 @@ from pelorus import motion
 from pelorus.converters import order, ros_frames
 from pelorus.converters.bag import Bag
 from pelorus.frames import Imu, Twist
+from pelorus.inertial_survey import readings_of
 from pelorus.recording import Recording
 from rigs import opencv_text
 from scipy.spatial.transform import Rotation
@@ -400,3 +401,49 @@ def test_twists_of_a_file_are_turned_by_their_own_orientation(
     )
     said = pelorus("convert", "ros", bag, target, *words, "--twist-in", "world", status=1).err
     assert "has no orientation, and --twist-in world turns by it" in said
+
+
+# --- stamps of drivers and devices ----------------------------------------------------------------
+
+
+def test_readings_of_a_bag_that_share_a_stamp_are_spread(
+    drive: Recording, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder, count, batch = with_tracks(Recorder(2), drive), 2400, 8
+    true = NS + (np.arange(count) + 1) * 5_000_000
+    for k, t in enumerate(true[np.arange(count) // batch * batch + batch - 1].tolist()):
+        recorder.imu("/imu", t, (0.1, 0.2, 9.8), (0.01 * k, 0, 0))
+        topic, kind, _, message = recorder.found.pop()
+        recorder.found.append((topic, kind, int(true[k]) + 1_000_000, message))
+    bag, target = written(recorder, tmp_path / "b", "lone mcap"), tmp_path / "out.plr"
+    said = pelorus("convert", "ros", bag, target, *on_body(tmp_path, drive)).out
+    assert "/imu: 8 readings have one stamp (the median): spread" in " ".join(said.split())
+    t_ns = readings_of(messages_of(target, Imu)).t_ns
+    assert len(t_ns) > 0.95 * count
+    assert np.abs(t_ns - true[-len(t_ns) :]).max() <= 1
+
+
+def test_a_bag_whose_device_counts_32_bits_of_us_is_unwrapped(
+    drive: Recording, tmp_path: Path, pelorus: Run
+) -> None:
+    period = 1000 << 32
+    begin = period - 5 * NS
+    recorder = Recorder(2)
+    bounds = drive.tracks.bounds()
+    for k, t in enumerate((drive.frame_t_ns - drive.frame_t_ns[0]).tolist()):
+        rows = slice(bounds[k], bounds[k + 1])
+        names = dict(zip(("uL", "vL", "uR", "vR"), drive.tracks.pixels[rows].T, strict=True))
+        columns = {"id": drive.tracks.id[rows], **names}
+        recorder.cloud("/tracks", (begin + t) % period, columns, "")
+        topic, kind, _, message = recorder.found.pop()
+        recorder.found.append((topic, kind, 9 * NS + t, message))
+    for k in range(2400):
+        recorder.imu("/imu", (begin + k * 5_000_000) % period, (0.1, 0.2, 9.8), (0.01 * k, 0, 0))
+        topic, kind, _, message = recorder.found.pop()
+        recorder.found.append((topic, kind, 9 * NS + k * 5_000_000, message))
+    bag, target = written(recorder, tmp_path / "b", "lone mcap"), tmp_path / "out.plr"
+    said = " ".join(pelorus("convert", "ros", bag, target, *on_body(tmp_path, drive)).out.split())
+    assert "/imu: its clock of 32 bits of us starts again at 0: unwrapped" in said
+    t_ns = readings_of(messages_of(target, Imu)).t_ns
+    assert len(t_ns) == 2400
+    assert (np.diff(t_ns) == 5_000_000).all()

@@ -104,6 +104,9 @@ def cases() -> Iterator[Case]:
         yield Case(name, f"imu/{name}-60-seed0.npz", ("imu-npz",), conf("imu"))
 
 
+START = "images/euroc-mh01-start"
+
+
 def by_real_imu() -> Iterator[Case]:
     """EuRoC: real readings with simulated points, with tracks of real pictures, with pictures."""
     for name, file, convert, figure in (
@@ -111,7 +114,7 @@ def by_real_imu() -> Iterator[Case]:
         ("euroc V102", "imu/euroc-V102-real-imu.npz", ("imu-npz",), "ATE"),
         ("euroc V203", "imu/euroc-V203-real-imu.npz", ("imu-npz",), "ATE"),
         ("euroc MH01 tracks", "imu/euroc-mh01-tracks.plr", (), "err0"),
-        ("euroc MH01 pictures", "images/euroc-mh01-start", ("euroc",), "err0"),
+        ("euroc MH01 pictures", START, ("euroc", "--truth", str(DATA / START / "truth.tum")), "err0"),
     ):
         yield Case(f"{name}, default", file, convert, (), figure)
         yield Case(name, file, convert, conf("imu-adis16448"), figure)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 PART_FOLDER = ".part"  # in a folder: what is not yet whole
 STANDARD_OUTPUT = Path("-")
+TEXT_BYTES_MAX = 1 << 20  # of settings and other small files
 
 
 class PelorusError(Exception):
@@ -88,7 +89,15 @@ def _collected() -> Iterator[Path]:
 def _file_of(path: Path) -> Path:
     """The file that a link stands for; of /dev/stdout the link is all that has a name."""
     opens_no_file = path.exists() and not path.is_file()
-    return path.resolve() if path.is_symlink() and not opens_no_file else path
+    return resolved(path) if path.is_symlink() and not opens_no_file else path
+
+
+def resolved(path: Path) -> Path:
+    """The path behind all links; PelorusError where they lead back to themselves."""
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError) as error:  # the latter until Python 3.12
+        raise PelorusError(f"{path}: is a link that leads back to itself") from error
 
 
 def _part(file: Path) -> Path:
@@ -141,9 +150,13 @@ def _move(part: Path, folder: Path) -> None:
 
 
 def read_text(path: Path) -> str:
-    """A text file as it is; PelorusError where it is none."""
+    """A text file as it is; PelorusError where it is none, or no end of it comes."""
     try:
-        return path.read_text(encoding="utf-8")
+        with path.open("rb") as stream:
+            found = stream.read(TEXT_BYTES_MAX + 1)
+        if len(found) > TEXT_BYTES_MAX:
+            raise PelorusError(f"{path}: is too long: at most {TEXT_BYTES_MAX} bytes are expected")
+        return found.decode("utf-8").replace("\r\n", "\n")
     except OSError as error:
         raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

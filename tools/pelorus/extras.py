@@ -21,6 +21,7 @@ EXTRAS = {
     "PIL": ("pictures need Pillow", "vision"),
     "matplotlib": ("drawings (.png) need matplotlib", "figures"),
     "rosbags": ("bags need rosbags", "ros"),
+    "pyulog": ("logs of PX4 need pyulog", "px4"),
     "pyproj": ("places on the earth need pyproj", "geodetic"),
 }
 

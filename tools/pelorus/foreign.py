@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Every file that somebody else wrote is opened here: text, CSV, JSON, YAML, .npz and .mat;
-but bags of ROS, which the library rosbags opens (converters/bag.py).
+but bags of ROS and logs of PX4, which libraries open (converters/bag.py, converters/ulog.py).
 
 Each reader has a limit of size, and one way to fail: ForeignFileError, whatever the file holds. The
 rest of the package opens no foreign file; tests/python/test_foreign.py sees to it.

@@ -64,7 +64,7 @@ def replay(
 ) -> tuple[dict[str, Any], list[str]]:
     """Run the filter; its summary, and what it had to say on the way."""
     wanted = [
-        *("--trajectory", str(outputs.trajectory), "--out", str(outputs.log), "--json"),
+        *("--trajectory", str(outputs.trajectory), "--out", str(outputs.log), "--force", "--json"),
     ]
     stdout, stderr = run_program(program, recording, [*options, *wanted])
     try:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import arrays, foreign
+from pelorus import arrays, foreign, stamps
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 
@@ -88,15 +88,63 @@ class Table:
         if self.has(self._time_column()):
             self._leave_out(arrays.never_set(self.times()), arrays.NEVER_SET)
         if each_time_once and self.has(self._time_column()):
+            self._spread_batches()
             again = np.asarray(np.diff(self.times(), prepend=-1) == 0, np.bool_)
             self._leave_out(again, "time does not ascend but repeats")
+
+    def _spread_batches(self) -> None:
+        """Give readings that share stamps, as a driver gives them to a batch, times of their own.
+
+        Rows that stand twice are no batch.
+        """
+        if not self._share_times(self.times()):
+            return
+        cells = np.array(list(zip(*self._columns.values(), strict=True)))
+        copies = np.concatenate(([False], (cells[1:] == cells[:-1]).all(axis=1)))
+        self.keep(~copies)
+        if copies.any():
+            self.remarks.append(f"{self.path}: {int(copies.sum())} rows stand twice: left out")
+        t_ns = self.times()
+        if not self._share_times(t_ns):
+            return
+        found = stamps.spread(t_ns)
+        del self._columns[self._time_column()]
+        self._columns["t_ns"] = [str(t) for t in found.t_ns.tolist()]
+        self.remarks.append(
+            f"{self.path}: {found.batch} readings have one time (the median): spread over the time "
+            "since the ones before, the last one at its stamp"
+        )
+
+    @staticmethod
+    def _share_times(t_ns: NDArray[np.int64]) -> bool:
+        """Whether so many rows repeat the time before that it is a driver's habit."""
+        steps = np.diff(t_ns)
+        return bool((steps == 0).sum() > foreign.BAD_ROWS_MAX * len(t_ns) and (steps >= 0).all())
+
+    def keep(self, good: NDArray[np.bool_]) -> None:
+        """Keep these rows alone."""
+        kept = np.nonzero(good)[0].tolist()
+        self.rows = self.rows[good]
+        self._columns = {n: [column[k] for k in kept] for n, column in self._columns.items()}
+
+    def cells(self, name: str) -> list[str]:
+        """Of a column, as they stand."""
+        return self._columns[name]
+
+    @property
+    def has_times(self) -> bool:
+        """Whether some column holds times that can be read."""
+        name = self._time_column()
+        return self.has(name) and not any(map(_is_none, self._columns[name]))
+
+    def is_numeric(self, name: str) -> bool:
+        """Whether every cell of a column is a number."""
+        return all(map(foreign.is_number, self._columns[name]))
 
     def _leave_out(self, wrong: NDArray[np.bool_], what: str) -> None:
         self.remarks += foreign.left_out(self.path, wrong, self.row, what)
         if wrong.any():
-            keep = np.nonzero(~wrong)[0].tolist()
-            self.rows = self.rows[~wrong]
-            self._columns = {n: [column[k] for k in keep] for n, column in self._columns.items()}
+            self.keep(~wrong)
 
     def miss(self, column: str, name: str) -> None:
         """`column`, which is not here, should have been renamed."""
@@ -182,7 +230,11 @@ class Table:
             t_ns = self._exact_ns(name, TIME_UNITS[unit])
         if not len(t_ns):
             raise ForeignFileError(self.path, "holds column names but no row")
-        return t_ns
+        found = stamps.unwrapped(t_ns)
+        remark = f"{self.path}: {self._called(name)}: {found.words}"
+        if found.wraps and remark not in self.remarks:
+            self.remarks.append(remark)
+        return found.t_ns
 
     def _time_column(self) -> str:
         """t_ns and such, t_s if there is none; t is one of them: its numbers are s or ns."""

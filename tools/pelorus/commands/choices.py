@@ -8,8 +8,10 @@ from pathlib import Path
 
 import typer
 
+from pelorus import schema
 from pelorus.errors import PelorusError, read_text
 from pelorus.frames import TwistTiming
+from pelorus.settings import IDS
 
 LOG: Path = typer.Argument(
     ...,
@@ -97,4 +99,21 @@ def settings_given(config: Path | None, settings: list[str]) -> dict[str, str]:
                 given[name] = value
     options = replay_options(None, settings)
     pairs = zip(options[::2], options[1::2], strict=True)
-    return given | {name.removeprefix("--"): value for name, value in pairs}
+    given |= {name.removeprefix("--"): value for name, value in pairs}
+    for name, value in given.items():
+        _require_words(name, value, config)
+    return given
+
+
+def _require_words(name: str, value: str, config: Path | None) -> None:
+    """Refuse a word that a setting of words does not have; the replay judges the numbers."""
+    setting = schema.SETTINGS[IDS[name]] if name in IDS else None
+    if setting is None or not setting.words:
+        return
+    asked = [] if setting.is_list and value == "off" else value.split(",")
+    if not set(asked) <= set(setting.words) or (len(asked) > 1 and not setting.is_list):
+        where = f"{config} or --set" if config else "--set"
+        raise PelorusError(
+            f"{where}: {name} = {value}: {', '.join(setting.words)} are possible"
+            + (", some of them between commas, or off" * setting.is_list)
+        )

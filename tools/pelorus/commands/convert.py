@@ -136,21 +136,23 @@ def csv(
     calibration: list[Path] = typer.Option(
         [],
         help="Of Kalibr (and a second time, its IMU file), ROS, OpenCV, ORB-SLAM3, VINS-Fusion, "
-        "Basalt, OKVIS or ZED (docs/CONVERT.md), or, of a rectified pair, JSON: fx_px, fy_px, "
-        "cx_px, cy_px, baseline_m, and R_CB, as three rows of three, with t_CB_m (body to "
-        "left camera) or R_BC with t_BC_m (the camera's pose in the body); optional "
-        "image_width_px, image_height_px, body_axes (forward-left-up, forward-right-down, "
+        "Basalt, OKVIS, SVO, maplab, ZED or OAK (docs/CONVERT.md), or, of a rectified pair, "
+        "JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB, as three rows of three, with "
+        "t_CB_m (body to left camera) or R_BC with t_BC_m (the camera's pose in the body); "
+        "optional image_width_px, image_height_px, body_axes (forward-left-up, forward-right-down, "
         "other), twist_timing (start, end, mid), name, and noise, an object with some of "
         "pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, bias_velocity_sigma_mps, "
         "bias_gyro_sigma_radps.",
     ),
     truth: Path | None = own.TRUTH,
     columns: list[str] = own.COLUMNS,
+    rows: list[str] = own.ROWS,
     crs: str = own.CRS,
     measured: str = own.MEASURED,
     twist_in: TwistIn = own.TWIST_IN,
     extrinsic: Path | None = own.EXTRINSIC,
     lens: LensModel | None = own.LENS,
+    cameras: str = own.CAMERAS,
     fix: Fix = own.FIX,
     twist_timing: Timing | None = own.TIMING,
     **readings: list[Path],
@@ -164,7 +166,8 @@ def csv(
         truth,
         extrinsic,
         lens,
-        Columns.of(columns, crs),
+        own.names(cameras),
+        Columns.of(columns, crs, rows),
     )
     found = csv_converter.read(sources, readings, timing)
     importers.converted(found, timing, fix is Fix.AUTO, target)

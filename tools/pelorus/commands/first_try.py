@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 
 from pelorus.console import out
-from pelorus.errors import Existing, PelorusError, made
+from pelorus.errors import Existing, PelorusError, made, resolved
 
 RECORDINGS = (".plr", ".plr.zst")
 BAGS = (".bag", ".mcap", ".db3")
@@ -93,7 +93,7 @@ def first_try(
     """
     force = ("--force",) if Existing.overwritten else ()  # each command asks for itself
     kind = _format_of(source)
-    name = source.name.removesuffix(".zst").removesuffix(".plr") or source.resolve().name
+    name = source.name.removesuffix(".zst").removesuffix(".plr") or resolved(source).name
     into = made(folder or Path(f"try-{name}"))
     recording = source
     if kind:

@@ -36,11 +36,13 @@ SHARED: dict[str, tuple[Any, Any]] = {
     "calibration": (list[Path], own.CALIBRATION),
     "extrinsic": (Path | None, own.EXTRINSIC),
     "lens": (LensModel | None, own.LENS),
+    "cameras": (str, own.CAMERAS),
     "twists": (Path | None, own.TWISTS),
     "gyro": (Path | None, own.GYRO),
     "imu": (Path | None, own.IMU),
     "truth": (Path | None, own.TRUTH),
     "columns": (list[str], own.COLUMNS),
+    "rows": (list[str], own.ROWS),
     "crs": (str, own.CRS),
     "measured": (str, own.MEASURED),
     "twist_in": (TwistIn, own.TWIST_IN),
@@ -90,18 +92,20 @@ def _asked(
     calibration: list[Path],
     extrinsic: Path | None,
     lens: LensModel | None,
+    cameras: str,
     twists: Path | None,
     gyro: Path | None,
     imu: Path | None,
     truth: Path | None,
     columns: list[str],
+    rows: list[str],
     crs: str,
     measured: str,
     twist_in: TwistIn,
     twist_timing: Timing | None,
     fix: Fix,
 ) -> Asked:
-    named = Columns.of(columns, crs)
+    named = Columns.of(columns, crs, rows)
     timing = None if twist_timing is None else twist_timing.value_in_header
     files = csv.MotionFiles(twists, gyro, imu, csv.measured_of(measured), twist_in)
     motion = None
@@ -116,6 +120,7 @@ def _asked(
         tuple(calibration),
         extrinsic,
         lens,
+        own.names(cameras),
         motion,
         poses,
         files.measured,

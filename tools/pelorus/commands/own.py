@@ -8,6 +8,12 @@ import typer
 from pelorus.commands.choices import Fix
 from pelorus.converters.streams import TwistIn
 
+
+def names(words: str) -> tuple[str, ...]:
+    """Of words that are parted by commas."""
+    return tuple(word.strip() for word in words.split(",") if word.strip())
+
+
 TARGET = typer.Argument(
     ..., metavar="OUT.plr", help="The recording to write; as OUT.plr.zst it is packed."
 )
@@ -20,7 +26,7 @@ CALIBRATION = typer.Option(
     [],
     metavar="FILE",
     help="What calibrates the cameras: of Kalibr (and a second time, its IMU file), ROS, OpenCV, "
-    "ORB-SLAM3, VINS-Fusion, Basalt, OKVIS, ZED; docs/CONVERT.md has them all.",
+    "ORB-SLAM3, VINS-Fusion, Basalt, OKVIS, SVO, maplab, ZED, OAK; docs/CONVERT.md has them all.",
 )
 TWISTS = typer.Option(
     None,
@@ -50,6 +56,12 @@ COLUMNS = typer.Option(
     help="Columns that are called otherwise, with the unit behind the last underscore or a colon: "
     "v=speed_kmh,w=yaw_rate:deg/s,t=stamp_ms; for one file: stereo.t=stamp_ms.",
 )
+ROWS = typer.Option(
+    [],
+    metavar="COLUMN=VALUE",
+    help="The rows to take of a file with several sensors, which a column tells apart: I=1, or of "
+    "one file imu.I=1; repeatable. Else the first sensor's.",
+)
 CRS = typer.Option(
     "",
     metavar="CRS",
@@ -76,6 +88,12 @@ EXTRINSIC = typer.Option(
     metavar="FILE",
     help="JSON with R_CB, as three rows of three, and t_CB_m (body to left camera), or R_BC and "
     "t_BC_m, where the calibration does not say it or is of another body.",
+)
+CAMERAS = typer.Option(
+    "",
+    metavar="NAME,NAME",
+    help="Of a calibration of more than two cameras the two that are the pair, as it calls them: "
+    "cam1,cam2, or their topics; else the first two that are alike.",
 )
 LENS = typer.Option(
     None,

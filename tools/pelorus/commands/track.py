@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 
 from pelorus.console import out, progress
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, resolved
 from pelorus.row_gaps import TOLD_ABOVE_PX, row_gaps
 from pelorus.tracking import images, output, sheet
 from pelorus.tracking.images import Gray, Pair
@@ -103,7 +103,7 @@ def _require_places(target: Path, sheet_file: Path | None) -> None:
     for path in (target, sheet_file):
         if path is not None and not path.parent.is_dir():
             raise PelorusError(f"{path}: cannot be written: there is no folder {path.parent}")
-    if sheet_file is not None and sheet_file.resolve() == target.resolve():
+    if sheet_file is not None and resolved(sheet_file) == resolved(target):
         raise PelorusError(f"{target}: is given for the tracks and for the sheet; two are due")
 
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 NS = 10**9
+PERIOD_NS = 1000 << 32  # of a counter of 32 bits of us
+ACROSS_NS = NS  # a stream has no longer pause where it wraps
 HEADER, LOG = "header", "log"
 WHOLE = (0.0, math.inf)
 
@@ -61,6 +63,7 @@ class Bag(AbstractContextManager["Bag"]):
         self._seconds = max(self._reader.duration, 1) / NS
         self.begins_ns = int(self._reader.start_time)
         self._part_s = part
+        self.wrapped: dict[str, None] = {}  # topics whose counter started again
 
     def _opened(self) -> AnyReader:
         with extra("rosbags"):
@@ -137,12 +140,15 @@ class Bag(AbstractContextManager["Bag"]):
     ) -> Iterator[Stamped]:
         wanted = [c for c in reader.connections if c.topic in topics]
         first_s, last_s = self._part_s
+        latest: dict[str, int] = {}
         try:
             for connection, arrival_ns, raw in reader.messages(wanted):
                 if not whole and not first_s <= (arrival_ns - self.begins_ns) / NS <= last_s:
                     continue
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 t_ns = self._time(message, arrival_ns)
+                if self.stamps == HEADER:
+                    t_ns = self._unwrapped(connection.topic, t_ns, latest)
                 yield Stamped(connection.topic, t_ns, message, arrival_ns)
         except PelorusError:
             raise
@@ -154,6 +160,19 @@ class Bag(AbstractContextManager["Bag"]):
             return arrival_ns
         stamp = message.header.stamp
         return int(stamp.sec) * NS + int(stamp.nanosec)
+
+    def _unwrapped(self, topic: str, t_ns: int, latest: dict[str, int]) -> int:
+        """The time of a counter of 32 bits of us that starts again at 0 in mid-drive: a stamp that
+        is within ACROSS_NS of the latest one, but for whole periods.
+        """
+        before = latest.get(topic, t_ns)
+        if t_ns < PERIOD_NS:
+            turns = round((before - t_ns) / PERIOD_NS)
+            if turns > 0 and abs(t_ns + turns * PERIOD_NS - before) < ACROSS_NS:
+                t_ns += turns * PERIOD_NS
+                self.wrapped[topic] = None
+        latest[topic] = t_ns
+        return t_ns
 
     def _unreadable(self, error: Exception) -> ForeignFileError:
         words = (str(error).splitlines() or [type(error).__name__])[0]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
 
-from pelorus.converters import geodetic
+from pelorus.converters import geodetic, instances, ulog
 from pelorus.converters.geodetic import Ground
 from pelorus.errors import PelorusError
 from pelorus.table import TIME_UNITS, Table
@@ -43,6 +43,17 @@ NAMES: dict[str, tuple[str, Mapping[str, float]]] = {
     **{f"{axis}{side}": (f"{axis}{side}_px", NUMBER) for side in "LR" for axis in "uv"},
 }
 
+# Columns whose names say their units in brackets, as EuRoC's and others' do.
+BRACKETED = re.compile(r"(?P<base>[^\[]*?)\s*\[.+\]")
+BASES = {
+    "t": re.compile(r"t|time|timestamp|stamp"),
+    "w": re.compile(r"(?:w|gyr|gyro|omega|angular_velocity)(?:_RS_S)?[_ .]?(?P<axis>[xyz])"),
+    "a": re.compile(
+        r"(?:a|acc|accel|acceleration|linear_acceleration)(?:_RS_S)?[_ .]?(?P<axis>[xyz])"
+    ),
+}
+
+MOTION = ("twists", "imu", "gyro")  # files that may hold several sensors
 PLACES = ("position", "truth")  # files whose places may be on the earth
 
 # A column with the plain name, vx, is taken in the first unit, and that is said.
@@ -73,17 +84,20 @@ class Columns:
     seen: dict[Path, list[str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)  # of the files that were read
     ground: Ground = field(default_factory=Ground)
+    rows: list[instances.Asked] = field(default_factory=list)
 
     @classmethod
-    def of(cls, words: list[str], crs: str = "") -> Columns:
-        """Of the words of --columns and of --crs."""
+    def of(cls, words: list[str], crs: str = "", rows: Sequence[str] = ()) -> Columns:
+        """Of the words of --columns, of --crs and of --rows."""
         parts = [part.strip() for word in words for part in word.split(",") if part.strip()]
         given = [_column(part) for part in parts if not _says_nothing(part)]
-        return cls(given, ground=Ground(crs))
+        asked = [instances.Asked.of(words) for words in rows]
+        return cls(given, ground=Ground(crs), rows=asked)
 
     def read(self, path: Path, file: str) -> Table:
         """The file's columns under the project's names; `file` is its option's name."""
-        table = Table.read(path)
+        table = ulog.table(path, file) if ulog.is_one(path) else Table.read(path)
+        self.remarks.extend(table.remarks)
         table.hint_of, table.plain, table.remarks = _hint, PLAIN, self.remarks
         self.seen[path] = table.names
         for one in self.given:
@@ -94,6 +108,10 @@ class Columns:
                 one.used = True
             else:
                 table.miss(one.column, one.target)
+        _name_bracketed(table)
+        asked = [one for one in self.rows if one.file in ("", file) and one.column in table.names]
+        if file in MOTION or asked:
+            instances.take(table, asked)
         if file in PLACES:
             geodetic.localise(table, self.ground)
         return table
@@ -107,6 +125,27 @@ class Columns:
                     f"--columns {one.words}: no file has the column {one.column}; there are: "
                     f"{there}"
                 )
+        for row in self.rows:
+            if not any(row.column in names for names in self.seen.values()):
+                there = "; ".join(f"{p}: {', '.join(names)}" for p, names in self.seen.items())
+                raise PelorusError(f"--rows {row.column}={row.value}: there are: {there}")
+
+
+def _name_bracketed(table: Table) -> None:
+    """Give the project's names to columns of other programs that tell their units: a time, rates
+    of turn, specific forces.
+    """
+    for column in table.names:
+        bracketed = BRACKETED.fullmatch(column)
+        for letter, base in BASES.items() if bracketed else ():
+            found = base.fullmatch(bracketed["base"]) if bracketed else None
+            if found is None:
+                continue
+            unit, axis = _unit_in(column), found.groupdict().get("axis", "")
+            target, units = NAMES[letter + axis]
+            own = f"t_{unit}" if letter == "t" else target
+            if unit in units and own not in table.names:
+                table.rename(column, own, 1.0 if letter == "t" else units[unit])
 
 
 def _says_nothing(words: str) -> bool:

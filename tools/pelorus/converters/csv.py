@@ -67,7 +67,7 @@ class MotionFiles:
 
 @dataclass(frozen=True)
 class Sources:
-    """The files of one recording; `calibration`, `extrinsic` and `lens` as rig.read has them."""
+    """The files of one recording; those of its calibration, and choices, as rig.read has them."""
 
     motion: MotionFiles
     stereo: Path | None
@@ -75,6 +75,7 @@ class Sources:
     truth: Path | None = None
     extrinsic: Path | None = None
     lens: LensModel | None = None
+    cameras: tuple[str, ...] = ()
     columns: Columns = field(default_factory=Columns)
 
 
@@ -120,7 +121,9 @@ def _calibrated(sources: Sources) -> Calibrated:
         return rig_files.without_cameras(paths, "no camera")
     if not paths:
         raise PelorusError(f"{sources.stereo}: of which cameras? --calibration FILE is due")
-    return rig_files.read(paths, sources.stereo.stem, sources.extrinsic, sources.lens)
+    return rig_files.read(
+        paths, sources.stereo.stem, sources.extrinsic, sources.lens, sources.cameras
+    )
 
 
 def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) -> Seen:

@@ -20,7 +20,7 @@ import numpy as np
 
 from pelorus import arrays, foreign, motion, se3, trajectory
 from pelorus.converters.streams import Asked, Pictures, Readings, Streams
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, resolved
 from pelorus.foreign import ForeignFileError
 from pelorus.inertial import Inertial
 from pelorus.motion import Times
@@ -48,9 +48,11 @@ def read(folder: Path, asked: Asked) -> Streams:
     """What the folder holds."""
     top = _top(folder)
     body = _of_body(top / IMU)
-    paths = asked.calibration or _calibrations(top)
-    calibrated = rig_files.read(paths, folder.resolve().name, asked.extrinsic, asked.lens)
-    if not asked.calibration and asked.extrinsic is None and body is not None:
+    given, name = asked.calibration, resolved(folder).name
+    of_imu = rig_files.are_of_imu(given)  # beside the folder's own cameras
+    paths = given if given and not of_imu else _calibrations(top, given)
+    calibrated = rig_files.read(paths, name, asked.extrinsic, asked.lens, asked.cameras)
+    if (not given or of_imu) and asked.extrinsic is None and body is not None:
         calibrated = _on_imu(calibrated, body)
     rig = calibrated.rig
     ordered = tuple(reversed(CAMERAS)) if rig is not None and rig.swapped else CAMERAS
@@ -78,10 +80,12 @@ def _top(folder: Path) -> Path:
 # --- calibration ----------------------------------------------------------------------------------
 
 
-def _calibrations(top: Path) -> tuple[Path, ...]:
+def _calibrations(top: Path, of_imu: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Of the folder; the files of an IMU that the user gives take the place of its own."""
     beside = top.parent / TUM_VI
     if not (top / CAMERAS[0] / "sensor.yaml").is_file() and (beside / "camchain.yaml").is_file():
-        return tuple(path for path in map(beside.joinpath, TUM_VI_FILES) if path.is_file())
+        cameras, imu = map(beside.joinpath, TUM_VI_FILES)
+        return (cameras, *(of_imu or [path for path in (imu,) if path.is_file()]))
     cameras = [top / name / "sensor.yaml" for name in CAMERAS]
     lacking = [path for path in cameras if not path.is_file()]
     if lacking:
@@ -90,7 +94,7 @@ def _calibrations(top: Path) -> tuple[Path, ...]:
             "camchain YAML, OpenCV's stereo YAML)"
         )
     imu = top / IMU / "sensor.yaml"
-    return (*cameras, imu) if imu.is_file() else tuple(cameras)
+    return (*cameras, *(of_imu or [path for path in (imu,) if path.is_file()]))
 
 
 def _of_body(folder: Path) -> Poses | None:

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from pelorus import arrays, foreign, motion, se3, trajectory
 from pelorus.console import progress
 from pelorus.converters.streams import Asked, Pictures, Streams, Twists
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, resolved
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 from pelorus.motion import Times
@@ -76,7 +76,7 @@ def read(folder: Path, asked: Asked, made: Made) -> Streams:
 
 def _raw(folder: Path, asked: Asked) -> Streams:
     cameras = _cameras(folder, RAW_PAIRS)
-    rig = _raw_rig(folder.resolve().parent, cameras)
+    rig = _raw_rig(resolved(folder).parent, cameras)
     pairs = images.pairs(folder / cameras.left / "data", folder / cameras.right / "data")
     t_ns = _stamps(folder / cameras.left / "timestamps.txt", len(pairs))
     packets, oxts_t_ns = _oxts(folder / "oxts")
@@ -189,7 +189,7 @@ def _odometry(folder: Path, asked: Asked, made: Made) -> Streams:
 
 
 def _poses_file(folder: Path) -> Path:
-    own = folder.resolve()
+    own = resolved(folder)
     return own.parents[1] / "poses" / f"{own.name}.txt"
 
 
@@ -238,9 +238,9 @@ def _cameras(folder: Path, known: Sequence[tuple[str, str]]) -> _Folder:
 
 
 def _calibrated(folder: Path, rig: Rig, asked: Asked) -> Calibrated:
-    name = folder.resolve().name
+    name = resolved(folder).name
     if asked.calibration:
-        return rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens)
+        return rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens, asked.cameras)
     return rig_files.of_rig(rig, name, asked.extrinsic)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtri
 
-from pelorus import arrays, foreign
+from pelorus import arrays, foreign, stamps
 from pelorus.converters.bag import NS, Bag
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
@@ -75,12 +75,28 @@ def leave_out(
         remarks.append(f"{topic}: {bad} of {count} {wrong}: left out")
 
 
-def in_order(bag: Bag, topic: str, stamps: Stamps, remarks: list[str]) -> NDArray[np.intp]:
+def spread(topic: str, given: Stamps, remarks: list[str]) -> Stamps:
+    """The readings with times of their own where a driver gives a batch of them one stamp."""
+    t_ns, numbers = given.t_ns, given.numbers
+    if numbers is None or (np.diff(t_ns) < 0).any():
+        return given
+    once = np.sort(_without_copies(given))
+    if (np.diff(t_ns[once]) == 0).sum() <= foreign.BAD_ROWS_MAX * len(once):
+        return given
+    found = stamps.spread(t_ns[once])
+    remarks.append(
+        f"{topic}: {found.batch} readings have one stamp (the median): spread over the time since "
+        "the ones before, the last one at its stamp"
+    )
+    return given.at(once)._replace(t_ns=found.t_ns)
+
+
+def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray[np.intp]:
     """Which messages are taken: in the order of time, the first of those of one time. A clock that
     was set back is refused.
     """
-    t_ns = stamps.t_ns
-    found = _written_back(stamps) or _interleaved(stamps.at(_without_copies(stamps)))
+    t_ns = given.t_ns
+    found = _written_back(given) or _interleaved(given.at(_without_copies(given)))
     if found is not None:
         until, later = (
             t / NS for t in (found.until_ns - bag.begins_ns, found.from_ns - bag.begins_ns)
@@ -101,8 +117,8 @@ def in_order(bag: Bag, topic: str, stamps: Stamps, remarks: list[str]) -> NDArra
             f"{behind.max() * 1e-6:.3g} ms: put in the order of their stamps"
         )
     times, first = np.unique(t_ns, return_index=True)
-    if stamps.numbers is not None:
-        other = len(_without_copies(stamps)) - len(times)
+    if given.numbers is not None:
+        other = len(_without_copies(given)) - len(times)
         if other > foreign.BAD_ROWS_MAX * len(t_ns):
             raise ForeignFileError(
                 bag.path,
@@ -115,9 +131,9 @@ def in_order(bag: Bag, topic: str, stamps: Stamps, remarks: list[str]) -> NDArra
     return first
 
 
-def _written_back(stamps: Stamps) -> SetBack | None:
+def _written_back(given: Stamps) -> SetBack | None:
     """Where stamps go back and the time behind is covered a second time."""
-    t_ns, arrival_ns, _ = stamps
+    t_ns, arrival_ns, _ = given
     latest = np.maximum.accumulate(t_ns)
     late = t_ns < latest
     starts = np.nonzero(late & ~np.concatenate(([False], late[:-1])))[0]
@@ -132,20 +148,20 @@ def _written_back(stamps: Stamps) -> SetBack | None:
     return None
 
 
-def _without_copies(stamps: Stamps) -> NDArray[np.intp]:
+def _without_copies(given: Stamps) -> NDArray[np.intp]:
     """In the order of time, without messages that are there twice, as in a bag of two recorders;
     without numbers to compare, without all that repeat a time.
     """
-    order, numbers = np.argsort(stamps.t_ns, kind="stable"), stamps.numbers
-    same = np.diff(stamps.t_ns[order]) == 0
+    order, numbers = np.argsort(given.t_ns, kind="stable"), given.numbers
+    same = np.diff(given.t_ns[order]) == 0
     if numbers is not None:
         same &= (numbers[order[1:]] == numbers[order[:-1]]).all(axis=1)
     return order[~np.concatenate(([False], same))]
 
 
-def _interleaved(stamps: Stamps) -> SetBack | None:
+def _interleaved(given: Stamps) -> SetBack | None:
     """Of sorted stamps: a stretch twice as dense as the rest, of two combs or of two drives."""
-    t_ns, arrival_ns, numbers = stamps
+    t_ns, arrival_ns, numbers = given
     steps = np.diff(t_ns).astype(np.float64)
     if len(steps) < 2 * TEETH_MIN:
         return None

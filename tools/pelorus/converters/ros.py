@@ -13,10 +13,12 @@ from pelorus.converters.ros_motion import IMU, Moving
 from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Readings, Streams, Twists
 from pelorus.converters.transforms import TF, Chain, Tree, bare
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, resolved
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import Rig
+
+WRAPPED = "its clock of 32 bits of us starts again at 0: unwrapped"
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     truth = asked.truth
     if truth is None and topics.moving.truth:
         truth = ros_motion.truth(bag, topics.moving.truth, remarks)
+    remarks += [f"{topic}: {WRAPPED}" for topic in bag.wrapped]
     return Streams(calibrated, frames, motion, truth, small, remarks, bool(topics.position))
 
 
@@ -66,12 +69,14 @@ def _calibrated(
     remarks: list[str],
 ) -> tuple[Calibrated, Cameras]:
     """Of the files, else of the bag's camera_info; on the body as the files or /tf_static say."""
-    name = bag.path.resolve().stem
+    name = resolved(bag.path).stem
     if rig_files.is_own(asked.calibration):
         found = rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens)
         return found, ros_frames.chosen(bag, topics.cameras)
-    if asked.calibration:
-        rig = rig_files.read_rig(asked.calibration, asked.lens)
+    of_imu = rig_files.are_of_imu(asked.calibration)  # the bag's camera_info tells the cameras
+    if asked.calibration and not of_imu:
+        named = asked.cameras or _named(bag, topics.cameras, rig_files.topics(asked.calibration))
+        rig = rig_files.read_rig(asked.calibration, asked.lens, named)
         cameras = ros_frames.chosen(bag, topics.cameras, rig)
     else:
         cameras = ros_frames.chosen(bag, topics.cameras)
@@ -79,10 +84,21 @@ def _calibrated(
         if rig.swapped:
             remarks.append(f"{cameras.left} stands on the right: taken as the right camera")
             cameras = replace(cameras, left=cameras.right, right=cameras.left)
+        if of_imu:
+            rig = rig_files.with_imu(rig, asked.calibration)
     if asked.extrinsic is None:
         body = bare(topics.moving.frame) or motion.frame
         rig = _on_body(bag, rig, cameras, body, isinstance(motion, Twists), tree, remarks)
     return rig_files.of_rig(rig, name, asked.extrinsic), cameras
+
+
+def _named(bag: Bag, cameras: Cameras, known: set[str]) -> tuple[str, ...]:
+    """Of a calibration's topics the user's two, or the two that the bag has; none otherwise."""
+    given = (cameras.left, cameras.right)
+    if known.issuperset(given):
+        return given
+    there = sorted(known.intersection(ros_frames.pictures(bag)))
+    return tuple(there) if len(there) == 2 < len(known) else ()
 
 
 def _of_camera_info(bag: Bag, cameras: Cameras, tree: Tree, remarks: list[str]) -> Rig:

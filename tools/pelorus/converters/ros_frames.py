@@ -59,6 +59,7 @@ CHANNELS |= dict.fromkeys(("yuv422", "uyvy", "yuv422_yuy2", "yuyv"), 2)
 PLAIN, DEEP = ("mono8", "8UC1"), ("mono16", "16UC1")
 SIDES = (("left", "right"), ("infra1", "infra2"), ("fisheye1", "fisheye2"))  # and RealSense
 NUMBERED = (("cam0", "cam1"), ("camera0", "camera1"), ("cam_0", "cam_1"), ("camera_0", "camera_1"))
+TOGETHER_MS = 3.0  # a pair within so much is as good as of one moment at a robot's speeds
 WAITING_MAX = 200  # pictures of one side that wait for the other
 # The numbers of PointCloud2's types.
 TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -77,13 +78,18 @@ class Cameras:
     frame: str = ""  # of the left one, in place of what its messages say
 
 
+def pictures(bag: Bag) -> list[str]:
+    """The topics that hold some."""
+    return bag.of_type(IMAGE, COMPRESSED)
+
+
 def chosen(bag: Bag, cameras: Cameras, rig: Rig | None = None) -> Cameras:
     """The user's topics; else the calibration's; else the one pair that is called left and right,
     or 0 and 1: 0 is the calibration's first camera.
     """
     if cameras.tracks:
         return cameras
-    there = bag.of_type(IMAGE, COMPRESSED)
+    there = pictures(bag)
     if cameras.left and cameras.right:
         for topic in (cameras.left, cameras.right):
             bag.require(topic, IMAGE, COMPRESSED)
@@ -144,6 +150,7 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
     bits = 16 if brightest is None else images.bits_up_to(brightest, bag.path, remarks)
     left, right = (_times(bag, topic, stamps[topic], remarks) for topic in topics)
     pairs = _paired(bag, cameras, left, right)
+    remarks += apart_words(pairs)
     alone = len(left) + len(right) - 2 * len(pairs)
     if alone:
         remarks.append(f"{alone} pictures have no partner and are left out")
@@ -196,6 +203,21 @@ def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
             f"{apart_ms:.3g} ms); cameras that are triggered together are due, or --pair-within MS"
         )
     return np.stack((left[pairs[:, 0]], right[pairs[:, 1]]), axis=-1)
+
+
+def apart_words(pairs: Times) -> list[str]:
+    """What is to be said of pairs whose stamps are so far apart that it matters in a turn."""
+    apart_ns = pairs[:, 1] - pairs[:, 0]
+    usual_ms = float(np.median(np.abs(apart_ns))) * 1e-6
+    if usual_ms <= TOGETHER_MS:
+        return []
+    later = "right" if np.median(apart_ns) > 0 else "left"
+    return [
+        f"left and right pictures are {usual_ms:.3g} ms apart in the median, up to "
+        f"{float(np.abs(apart_ns).max()) * 1e-6:.3g} ms, the {later} ones later: at 1 rad/s a "
+        f"point moves by {usual_ms * 1e-3:.2g} of the focal length meanwhile, and its depth is "
+        "wrong. Cameras that are triggered together are expected"
+    ]
 
 
 def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[tuple[Gray, Gray]]:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pelorus.console import progress
 from pelorus.converters import streams, twist_axes
 from pelorus.converters.bag import Bag, require_messages
-from pelorus.converters.order import Stamps, in_order, sound
+from pelorus.converters.order import Stamps, in_order, sound, spread
 from pelorus.converters.streams import Asked, Readings, Twists
 from pelorus.converters.transforms import Tree, bare
 from pelorus.errors import PelorusError
@@ -315,6 +315,7 @@ def rows_of(bag: Bag, topic: str, row: Callable[[Any], list[float]], remarks: li
     t_ns, arrival_ns = np.array([times for *times, _ in stamped], np.int64).T
     numbers = np.array([values for *_, values in stamped])
     good = sound(bag, topic, t_ns, numbers, remarks)
-    whole = Stamps(t_ns, arrival_ns, numbers).at(good)
+    whole = spread(topic, Stamps(t_ns, arrival_ns, numbers).at(good), remarks)
     order = in_order(bag, topic, whole, remarks)
-    return Rows(whole.t_ns[order], numbers[good][order], frame)
+    kept = whole.at(order)
+    return Rows(kept.t_ns, np.asarray(kept.numbers), frame)

@@ -15,11 +15,12 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.console import progress
-from pelorus.converters import earth_start, twist_noise
+from pelorus.converters import earth_start, full_scale, repeated, twist_noise
 from pelorus.errors import PelorusError
-from pelorus.faults import stale
+from pelorus.faults import resolution, stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
 from pelorus.foreign import ForeignFileError
@@ -42,6 +43,7 @@ FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
+RESOLUTIONS = 8  # stamps may be rounded to 10 ms, and to each finer power of ten
 PAUSE_STEPS = 5.0  # periods without a reading are a pause, across which nothing is interpolated
 # What no robot turns faster than while its tracks hold, about an axis that nothing measures: the
 # pictures find the rotation. It is one constant from frame to frame, in all readings between them.
@@ -87,12 +89,13 @@ class Readings:
 class Asked:
     """What a folder or a bag does not say, or says otherwise than its user: in place of its own.
 
-    `calibration`, `extrinsic` and `lens` are as rig.read has them.
+    `calibration`, `extrinsic`, `lens` and `cameras` are as rig.read has them.
     """
 
     calibration: tuple[Path, ...] = ()
     extrinsic: Path | None = None
     lens: LensModel | None = None
+    cameras: tuple[str, ...] = ()
     motion: Twists | Readings | None = None
     truth: Trajectory | None = None
     measured: frozenset[str] = Twists.measured  # of the source's own twists
@@ -141,25 +144,41 @@ class Streams:
 
 def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     """`settings` are those of the tracker."""
+    return _made(streams, settings)[0]
+
+
+def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[Finding]]:
+    """The recording, and what was found in making it."""
     calibrated, frames = streams.calibrated, streams.frames
     t_ns = frames.t_ns
     if calibrated.rig is not None:
         t_ns = calibrated.rig.on_body_clock(t_ns)
     _require_overlap(frames, t_ns, streams.motion)
+    truth = None if streams.truth is None else _at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
-        header, tracks = _tracked(frames, calibrated, settings or Settings())
+        repeats = repeated.Repeats(_moves(streams.motion, t_ns), t_ns)
+        header, tracks = _tracked(frames, calibrated, settings or Settings(), repeats)
+        t_ns = repeats.kept_t_ns
+        found = repeats.findings
     else:
         header, tracks, rig = calibrated.header, frames.tracks, calibrated.rig
+        sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
+        if len(sizes) == 1:
+            _require_resolution(frames.where, tracks, sizes[0])
         if rig is not None:
             rig = _of_pixels(rig, tracks)
             rectification = rig.rectification()
             header = rig.header(rectification, header.name)
             tracks = _rectified(tracks, rectification, frames.where)
+        moves = _moves(streams.motion, t_ns)
+        t_ns, tracks, found = repeated.left_out(moves, t_ns, tracks, header.camera)
     made = _with_motion(header, streams, t_ns, tracks)
-    if streams.truth is None:
-        return made
-    truth = _at_frames(streams.truth, t_ns)
-    return made.with_truth(truth.t_ns, truth.poses)
+    if isinstance(streams.motion, Readings):
+        made, more = full_scale.with_ranges(made, streams.motion.inertial)
+        found = [*found, *more]
+        made = replace(made, inertial=_from_truth(made.inertial, truth, t_ns))
+    made = made if truth is None else made.with_truth(truth.t_ns, truth.poses)
+    return made, found
 
 
 def converted(
@@ -170,13 +189,12 @@ def converted(
     `timing` overrides the calibration's. Without all six velocities only the tracks can be judged.
     An IMU's drive is judged, not mended.
     """
-    made = recording(found)
+    made, placed = _made(found, None)
     if timing is not None:
         made = made.with_header(twist_timing=timing)
-    placed = []
     if found.on_earth and found.truth is None:
         made, finding = earth_start.started(made)
-        placed = [finding]
+        placed = [*placed, finding]
     if not fix or not len(made.tracks):
         return made, placed
     if not isinstance(found.motion, Twists):
@@ -323,8 +341,20 @@ def _held_between(t_ns: Times, timing: TwistTiming) -> Times:
     return np.concatenate((t_ns[:1], half_way, t_ns[-1:]))
 
 
+def _times_of(motion: Twists | Readings) -> Times:
+    return motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
+
+
+def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
+    """Whether the body moves from the frame before to each; by an IMU, whether it turns."""
+    if isinstance(motion, Twists):
+        return repeated.moves(t_ns, motion.t_ns, motion.w_B_radps, motion.v_B_mps)
+    w = motion.inertial.w_B_radps
+    return repeated.moves(t_ns, motion.inertial.t_ns, w - np.median(w, axis=0), None)
+
+
 def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Readings) -> None:
-    own = motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
+    own = _times_of(motion)
     if t_ns[-1] < own[0] or own[-1] < t_ns[0]:
         where = frames.where if isinstance(frames, Seen) else frames.where[0]
         raise ForeignFileError(
@@ -352,6 +382,14 @@ def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
     return rig.of_size(*min(holding, key=np.prod))
 
 
+def _require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> None:
+    words = resolution.beyond(tracks.pixels, size)
+    if words:
+        raise ForeignFileError(
+            where, words, due="the calibration of these pictures, or pixels of those, are due"
+        )
+
+
 def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tracks:
     """Of the pixels that the cameras took; without those that no ray of the lens reaches."""
     pixels = rectification.pixels(tracks.pixels)
@@ -366,7 +404,7 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
 
 
 def _tracked(
-    pictures: Pictures, calibrated: Calibrated, settings: Settings
+    pictures: Pictures, calibrated: Calibrated, settings: Settings, repeats: repeated.Repeats
 ) -> tuple[Header, Tracks]:
     """The HEADER of the rectified pictures, and the tracks in them."""
     pairs = pictures.read()
@@ -387,6 +425,8 @@ def _tracked(
         for pair in chain((first,), pairs):
             for where, picture in zip(pictures.where, pair, strict=True):
                 images.require_alike(where, picture, first[0])
+            if repeats.leaves_out(*pair):
+                continue
             yield pair if show is None else show(*pair)
 
     return header, track(
@@ -397,12 +437,35 @@ def _tracked(
 # --- truth ----------------------------------------------------------------------------------------
 
 
-def _at_frames(truth: Trajectory, frame_t_ns: Times) -> Trajectory:
-    """The truth, and between its poses one at each frame without one: there it is compared."""
-    t_ns = truth.t_ns
+def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -> Trajectory:
+    """The truth while the sensors run, and between its poses one at each frame without one: there
+    it is compared; and one where the motion begins, from which a filter starts.
+
+    What a motion capture saw before or behind the sensors is not of the drive.
+    """
+    t_ns, own = truth.t_ns, _times_of(motion)
     if frame_t_ns[-1] < t_ns[0] or t_ns[-1] < frame_t_ns[0]:
         raise PelorusError(
             f"the truth spans {t_ns[0]} to {t_ns[-1]} ns, the frames {frame_t_ns[0]} to "
             f"{frame_t_ns[-1]} ns: they do not overlap; times on the twists' clock are due"
         )
-    return filled(truth, frame_t_ns)
+    if own[0] < t_ns[0] <= own[0] + _resolution_ns(t_ns):
+        t_ns = np.concatenate((own[:1], t_ns[1:]))  # it was rounded
+    whole = filled(truth._replace(t_ns=t_ns), np.union1d(frame_t_ns, own[:1]))
+    first, last = own[0], max(own[-1], frame_t_ns[-1])
+    inside = (whole.t_ns >= first) & (whole.t_ns <= last)
+    return Trajectory(whole.t_ns[inside], whole.poses.at(inside), whole.remarks)
+
+
+def _resolution_ns(t_ns: Times) -> int:
+    """To what the stamps were rounded: the largest power of ten that divides all of them."""
+    return max(int(10**k) for k in range(RESOLUTIONS) if not (t_ns % 10**k).any())
+
+
+def _from_truth(readings: Inertial, truth: Trajectory | None, frame_t_ns: Times) -> Inertial:
+    """Without the readings before a truth that begins between the first one and the first frame:
+    the filter starts from its pose.
+    """
+    if truth is None or not readings.t_ns[0] < truth.t_ns[0] <= frame_t_ns[0]:
+        return readings
+    return readings.at(readings.t_ns >= truth.t_ns[0])

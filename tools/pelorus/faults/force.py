@@ -23,6 +23,7 @@ from pelorus.se3 import Poses
 STRETCH_S = 10.0
 STRETCH_FRAMES = 20
 READINGS_HZ = 100.0
+NO_BREAKS = np.empty(0)
 OWN = 6  # unknowns of a stretch: V and g
 
 
@@ -96,12 +97,12 @@ def seconds(readings: Inertial) -> Floats:
     return np.asarray((readings.t_ns - readings.t_ns[0]) * 1e-9)
 
 
-def force(readings: Inertial, R: Floats, frame_s: Floats) -> Force:
-    """`frame_s` on the IMU's clock, from the first reading on."""
+def force(readings: Inertial, R: Floats, frame_s: Floats, breaks_s: Floats = NO_BREAKS) -> Force:
+    """`frame_s` on the IMU's clock, from the first reading on; at `breaks_s` a stretch begins."""
     t = seconds(readings)
     turns, at = _attitudes(R, t, frame_s)
     tau = np.diff(frame_s)
-    stretch, begin = _stretches(frame_s, t)
+    stretch, begin = _stretches(frame_s, t, breaks_s)
     body = _to_body(at, turns) / tau[:, None, None]
 
     def mean(rate: Floats) -> Floats:
@@ -151,13 +152,14 @@ def _reached(t: Floats, rates: Floats, frame_s: Floats) -> Floats:
     return np.asarray(rates)
 
 
-def _stretches(frame_s: Floats, t: Floats) -> tuple[NDArray[np.intp], Floats]:
+def _stretches(frame_s: Floats, t: Floats, breaks_s: Floats) -> tuple[NDArray[np.intp], Floats]:
     """Which stretch an interval is in, and when each begins: behind a pause, too."""
     whole = max(frame_s[-1] - frame_s[0], 1e-9)
     count = max(int(np.ceil(whole / STRETCH_S)), 1)
     count = max(min(count, (len(frame_s) - 1) // STRETCH_FRAMES), 1)
     begin = frame_s[0] + np.arange(count) * whole / count
     begin = np.union1d(begin, t[1:][pauses(t, t[:-1], t[1:])])
+    begin = np.union1d(begin, breaks_s)
     own = np.searchsorted(begin, frame_s[:-1], side="right") - 1
     return np.clip(own, 0, len(begin) - 1), begin
 

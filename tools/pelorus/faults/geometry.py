@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from pelorus.faults import imu_axes, mounting
+from pelorus.faults import imu_axes, mounting, platform
 from pelorus.faults.agreement import Agreement, agreement, halved
 from pelorus.faults.amounts import (
     BIAS_SIGMAS,
@@ -136,7 +136,9 @@ def _in_world(recording: Recording, seen: Seen) -> list[Fault]:
         Fault(
             "world-axes",
             "the velocities are in world axes (odom, map), and not in the body's: so they fit the "
-            "pictures. Turn each by the pose's attitude, v_body = R^T v_world",
+            "pictures. Turn each by the pose's attitude, v_body = R^T v_world, or have it done: "
+            "--twist-in world (world-velocity, if the rates of turn are the body's) when it is "
+            "converted",
             ratio=ratio,
         )
     ]
@@ -144,7 +146,8 @@ def _in_world(recording: Recording, seen: Seen) -> list[Fault]:
 
 def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
     """The same of an IMU's."""
-    found = imu_axes.measured(recording, seen, ImuBody(recording, seen))
+    body = ImuBody(recording, seen)
+    found = imu_axes.measured(recording, seen, body)
     if found is None:
         yield Fault(
             "time-apart", "readings and frames are of different times, hardly any in common"
@@ -154,10 +157,35 @@ def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
     why = imu_axes.explained(found, given)
     if why is None:
         return
+    at_times = _at_times(recording, seen, body)
+    if at_times is not None:
+        yield at_times
+        return
     fault = _why(why, given)
     if fault is not None:
         none = replace(why, of_turn=np.eye(3), of_force=np.eye(3))
         yield replace(fault, ratio=found.held_against(none) - found.held_against(why))
+
+
+def _at_times(recording: Recording, seen: Seen, body: ImuBody) -> Fault | None:
+    """Do the two disagree for some time alone, and agree otherwise?"""
+    wrong = platform.disagreeing(recording, seen, body)
+    if not wrong.any():
+        return None
+    t_s = body.frame_s(recording.frame_t_ns, 0.0)
+    others = seen.without(wrong)
+    edges = np.nonzero(np.diff(wrong.astype(np.int8)))[0] + 1
+    found = imu_axes.measured(recording, others, body, t_s[edges])
+    if found is None or imu_axes.explained(found, recording.T_CB.R) is not None:
+        return None
+    since = t_s - t_s[0]
+    return Fault(
+        "platform",
+        f"IMU and pictures do not tell the same motion {platform.words(since, wrong)}, and do "
+        "otherwise: a moving platform (lift, vehicle, ship), or much of the picture that moves?",
+        stops=False,
+        grave=False,
+    )
 
 
 def _why(why: imu_axes.Explained, given: Floats) -> Fault | None:
@@ -198,7 +226,8 @@ def _untold(frames: int) -> Fault:
 def _standing(seen: Seen, moved: Callable[[], Moving]) -> Iterator[Fault]:
     """A camera that stands tells noise, whatever is held against it."""
     if seen.moves < MOVES_SIGMAS and not moved().more_than_usual:
-        words = "the camera stands all along: axes, units, scale, clock and place cannot be judged"
+        how = "shakes for some time, and hardly moves" if seen.shakes else "stands all along"
+        words = f"the camera {how}: axes, units, scale, clock and place cannot be judged"
         yield Fault(UNTOLD, f"{words}. Drive, with turns", stops=False, grave=False)
 
 

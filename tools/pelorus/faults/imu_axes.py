@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.faults.axes import ways
 from pelorus.faults.fit import WITHIN, Design, Fit
-from pelorus.faults.force import by_images, force
+from pelorus.faults.force import NO_BREAKS, by_images, force
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Motions, Seen
 from pelorus.inertial import Inertial
@@ -41,6 +41,7 @@ LEVER_M, BIAS_MPS2, MATRIX = 3.0, 1.0, 1e3
 BLOCKS = 20
 ROUNDS = 8
 GRAVITY = 9.81
+UNIT_NEAR = np.log(1.5)  # of the median force to gravity, in the right unit
 TURN_UNITS = {
     1.0: "",
     np.pi / 180: "rates of turn are in degrees",
@@ -115,14 +116,19 @@ class Measured:
 
     turn: Matrix
     force: Matrix
+    usual_force: float  # the median of its size, in the unit in which it is given
 
     def held_against(self, why: Explained) -> float:
         """d^2 of both together."""
         return self.turn.held_against(why.of_turn) + self.force.held_against(why.of_force)
 
 
-def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None:
-    """At the clock's offset at which the turns fit best. None with too little to tell by."""
+def measured(
+    recording: Recording, seen: Seen, body: ImuBody, breaks_s: Floats = NO_BREAKS
+) -> Measured | None:
+    """At the clock's offset at which the turns fit best. None with too little to tell by. At
+    `breaks_s` another stretch begins.
+    """
     t_ns = recording.frame_t_ns
     at_offsets = {0.0: _turn(body, seen, t_ns, 0.0)}
     at_offsets |= {float(s): _turn(body, seen, t_ns, float(s)) for s in OFFSETS_S}
@@ -140,7 +146,8 @@ def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None
     else:
         attitudes = body.attitudes
     told = [
-        force(body.readings.at(half), attitudes[half], frame_s) for half in _halves(body.readings)
+        force(body.readings.at(half), attitudes[half], frame_s, breaks_s)
+        for half in _halves(body.readings)
     ]
     stretches = told[0].of_stretches()
     arm = se3.skew(_turns_without_noise(body.mean_turns(t_ns, offset), turn_fit))
@@ -156,7 +163,8 @@ def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None
     noise = np.sqrt(0.5) * (one - other)[:, :, :9]
     at = np.flatnonzero(good)
     fit = _fit(seen.rates[at, :3], one, other, noise, seen.variance[at, :3], beside, at)
-    return Measured(turn, fit.matrix)
+    usual = float(np.median(np.linalg.norm(body.readings.a_B_mps2, axis=1)))
+    return Measured(turn, fit.matrix, usual)
 
 
 def _halves(readings: Inertial) -> list[NDArray[np.intp]]:
@@ -276,11 +284,13 @@ def explained(found: Measured, R_CB: Floats) -> Explained | None:
     return None if simplest is none else simplest
 
 
-def _units(_: Measured) -> Iterator[Explained]:
+def _units(found: Measured) -> Iterator[Explained]:
+    """In another unit gravity is another number: where forces are 9.8 on average it is theirs."""
     none = np.eye(3)
     for (turn, of_turn), (force_, of_force) in product(TURN_UNITS.items(), FORCE_UNITS.items()):
         words = "; ".join(w for w in (of_turn, of_force) if w)
-        if words:
+        is_gravity = abs(np.log(found.usual_force * force_ / GRAVITY)) < UNIT_NEAR
+        if words and (is_gravity or not of_force):
             name = "unit-degrees" if of_turn else "unit-force"
             yield Explained(name, f"the IMU's {words}", turn * none, force_ * none)
     words = (

@@ -15,12 +15,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.faults import identity
+from pelorus.faults import identity, sync
 from pelorus.faults.fault import Fault
 from pelorus.faults.geometry import Judged, geometry
 from pelorus.faults.handeye import first_part
 from pelorus.faults.likelihood import of_share
 from pelorus.faults.moving import Moving, moving
+from pelorus.faults.resolution import of_resolution
 from pelorus.faults.seen import Seen, pauses
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
@@ -72,7 +73,7 @@ def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
     times = [fault for name, t_ns in times_ns.items() for fault in _times(name, t_ns)]
     times += _spans(*times_ns.items())
     short = first_part(recording)
-    pixels = list(_pixels(short))
+    pixels = list(of_resolution(short)) or _of_pair(short)
     if pixels or any(fault.name in ("time-unit", "time-apart") for fault in times):
         return Judged([*pixels, *times])  # what follows would be built on sand
     views = two_views(short.tracks, short.header.camera, 1)
@@ -127,6 +128,10 @@ def _beside_way(fault: Fault, recording: Recording, views: TwoViews, t_ns: Times
     which = np.cumsum(np.diff(within, prepend=False) & within)
     lost = [way[within & (which == k)].sum(axis=0) for k in np.unique(which[within])]
     lost_m = float(sum(np.linalg.norm(x) for x in lost))
+    if (within & ~seen.usable).any():
+        unknown = "no track spans them: how far the camera goes in them cannot be told"
+        words = f"{fault.words}; {unknown}"
+        return replace(fault, words=words, grave=False)
     words = f"{fault.words}; by the pictures the camera goes {lost_m:.2g} m in them"
     all_m = float(np.sum(np.linalg.norm(way, axis=1)))
     return replace(fault, words=words, grave=lost_m > GAP_WAY * all_m)
@@ -146,6 +151,15 @@ def _spans(body: tuple[str, Times], camera: tuple[str, Times]) -> Iterator[Fault
 
 
 # --- pixels and ids -------------------------------------------------------------------------------
+
+
+def _of_pair(recording: Recording) -> list[Fault]:
+    """What is wrong between left and right; moments that differ explain rows that do, too."""
+    wrong = list(_pixels(recording))
+    if any(fault.name != "unrectified" for fault in wrong):
+        return wrong
+    found = sync.apart(recording)
+    return wrong if found is None or not found.found else [found.fault]
 
 
 def _pixels(recording: Recording) -> Iterator[Fault]:

@@ -22,6 +22,7 @@ LONGER = 0.02  # by which a focal length is changed to see what that does
 
 GAP_PERIODS = 5.0  # of a stream: where it pauses for longer nothing is known of the motion
 BLOCKS = 20
+SHAKES_D2, SHAKES_SHARE = 600.0, 0.02  # of six degrees of freedom, ten sigma; of the frames
 BESIDE = (2, 3)  # frames: the next ones share a picture
 
 
@@ -47,6 +48,14 @@ class Seen:
         noise = np.sum(told * (own - told) * trust, axis=1)
         return float(np.sum(told * own * trust)) / standard_error(noise)
 
+    @property
+    def shakes(self) -> bool:
+        """Whether some frames move by far more than their noise, be it to and fro from one to the
+        next.
+        """
+        d2 = np.sum(self.rates[self.usable] ** 2 / self.variance[self.usable], axis=1)
+        return bool(len(d2)) and float(np.mean(d2 > SHAKES_D2)) > SHAKES_SHARE
+
     @classmethod
     def of(cls, recording: Recording, views: TwoViews) -> Seen:
         lag, R = views.lag, recording.T_CB.R
@@ -60,6 +69,14 @@ class Seen:
         usable = (views.counts >= POINTS_MIN) & np.isfinite(in_body).all(axis=1)
         usable &= tau <= GAP_PERIODS * np.median(tau)
         return cls(in_body, variance, usable, tau)
+
+    def without(self, wrong: NDArray[np.bool_]) -> Seen:
+        """Without these frames."""
+        halves = None
+        if self.halves is not None:
+            one, two = (replace(half, usable=half.usable & ~wrong) for half in self.halves)
+            halves = (one, two)
+        return replace(self, usable=self.usable & ~wrong, halves=halves)
 
     def beside(self) -> Floats:
         """(k, 6) v and w as the frames beside tell them, each as far as it knows; NaN where none

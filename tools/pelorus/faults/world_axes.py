@@ -19,6 +19,7 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 ROUNDS = 8
+MOVES_SHARE = 0.1  # of the usual speed by the pictures
 
 
 def world_axes(recording: Recording, seen: Seen) -> float:
@@ -31,6 +32,9 @@ def world_axes(recording: Recording, seen: Seen) -> float:
     arm = -recording.T_CB.R.T @ recording.T_CB.p
     own = seen.rates[:, :3] - np.cross(seen.rates[:, 3:], arm)
     good = seen.usable & np.isfinite(told).all(axis=1)
+    # wheels that stand, of a robot that is carried or lifted, have no direction
+    usual = float(np.median(np.linalg.norm(own[good], axis=1))) if good.any() else 0.0
+    good &= np.linalg.norm(np.nan_to_num(told), axis=1) > MOVES_SHARE * usual
     if good.sum() < BLOCKS_LEAST * BLOCKS:
         return 0.0
     R, told, own = R[good], told[good], own[good]

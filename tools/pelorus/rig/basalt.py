@@ -7,6 +7,8 @@ a right reading is (I + S) of the measured one less the bias.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -15,6 +17,7 @@ from pelorus.foreign import ForeignFileError
 from pelorus.frames import Noise
 from pelorus.layout import Floats
 from pelorus.named import Named
+from pelorus.rig import several
 from pelorus.rig.imu_model import Correction, ImuModel
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
@@ -43,20 +46,26 @@ def is_calibration(content: Named) -> bool:
     return isinstance(inner, dict) and "T_imu_cam" in inner
 
 
-def read(content: Named) -> Rig:
-    """Of the first two cameras."""
+def read(content: Named, asked: Sequence[str] = ()) -> Rig:
+    """Of two cameras: those asked for by number, else the two that are a pair."""
     whole = content.object("value0")
     poses = [_pose(one) for one in _each(whole, "T_imu_cam")]
     cameras = _each(whole, "intrinsics")
     sizes = whole.content.get("resolution", [])
-    if len(poses) < 2 or len(cameras) < 2:
-        raise ForeignFileError(content.path, "has one camera", due="two are due")
+    if min(len(poses), len(cameras)) < 2 or len(poses) != len(cameras):
+        raise ForeignFileError(
+            content.path,
+            f"has {len(cameras)} cameras and {len(poses)} of T_imu_cam",
+            due="two of each are due",
+        )
     lenses = [
-        _lens(camera, sizes[k] if k < len(sizes) else [0, 0])
-        for k, camera in enumerate(cameras[:2])
+        _lens(camera, sizes[k] if k < len(sizes) else [0, 0]) for k, camera in enumerate(cameras)
     ]
-    T_21 = se3.compose(se3.inverse(poses[1]), poses[0])
-    rig = Rig.of_cameras(content.path, lenses[0], lenses[1], T_21, se3.inverse(poses[0]))
+    known = [
+        several.Camera((f"cam{k}",), lens, se3.inverse(T))
+        for k, (lens, T) in enumerate(zip(lenses, poses, strict=True))
+    ]
+    rig = several.rig(content.path, known, asked)
     name = "cam_time_offset_ns"
     offset_s = whole.number(name) * 1e-9 if name in whole else 0.0
     return rig.with_imu(_imu(whole), offset_s)

@@ -11,6 +11,8 @@ T_BS         of sensor.yaml: brings points of the sensor to the body
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +22,7 @@ from pelorus.foreign import ForeignFileError
 from pelorus.frames import Noise
 from pelorus.layout import Floats
 from pelorus.named import Named, as_numbers, sane
-from pelorus.rig import spheres
+from pelorus.rig import several, spheres
 from pelorus.rig.imu_model import Correction, ImuModel
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig, rigid
@@ -36,6 +38,7 @@ LENSES = {
 }
 TO_CAMERA, FROM_CAMERA = ("T_cam_imu",), ("T_imu_cam", "T_BS")
 STEP = "T_cn_cnm1"
+CAMERA = re.compile(r"cam\d+")
 MODELS = ("pinhole", *spheres.PARAMETERS)
 FOCAL_MIN_PX = 1.0  # less is in another unit
 AGREE = 1e-3  # m and rad: two ways to the same camera
@@ -62,17 +65,52 @@ def is_imu(content: Named) -> bool:
     return "imu0" in content or any(name in content for name in NOISE.values())
 
 
-def camchain(content: Named) -> Rig:
-    """Of the first two cameras."""
+def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
+    """Of two cameras: those asked for by name or topic, else the two that are a pair."""
     if "cam1" not in content:
         raise ForeignFileError(content.path, "has one camera, cam0", due="cam0 and cam1 are due")
-    return pair(content.object("cam0"), content.object("cam1"))
+    names = [name for name in content.content if CAMERA.fullmatch(str(name))]
+    cameras = [content.object(name) for name in sorted(names, key=lambda name: int(name[3:]))]
+    if len(cameras) == 2 and not asked:
+        return pair(cameras[0], cameras[1])
+    known = [
+        several.Camera((camera.at, str(camera.content.get("rostopic", ""))), _lens(camera), T)
+        for camera, T in zip(cameras, _chained(cameras), strict=True)
+    ]
+    chosen = several.pair(content.path, known, asked)
+    first, second = cameras[chosen.first], cameras[chosen.second]
+    step = se3.compose(known[chosen.second].T, se3.inverse(known[chosen.first].T))
+    return replace(pair(first, second, step), remarks=chosen.remarks)
 
 
-def pair(first: Named, second: Named) -> Rig:
-    """Two cameras of one file, or of one each."""
+def _chained(cameras: Sequence[Named]) -> list[Poses]:
+    """To each camera from a frame that all share: the first one, or the IMU where all name it."""
+    on_body = [_on_body(camera) for camera in cameras]
+    known = [T for T in on_body if T is not None]
+    if len(known) == len(cameras):
+        return known
+    found = [se3.IDENTITY]
+    for camera in cameras[1:]:
+        if STEP not in camera:
+            raise ForeignFileError(
+                camera.path, "does not say where it stands", at=camera.at, due=f"{STEP} is due"
+            )
+        found.append(se3.compose(pose(camera, STEP), found[-1]))
+    return found
+
+
+def topics(content: Named) -> set[str]:
+    """Of its cameras."""
+    cameras = [one for one in content.content.values() if isinstance(one, dict)]
+    return {str(one["rostopic"]) for one in cameras if "rostopic" in one}
+
+
+def pair(first: Named, second: Named, step: Poses | None = None) -> Rig:
+    """Two cameras of one file, or of one each; `step` brings points of the first to the second,
+    else the file says it.
+    """
     T_1B, T_2B = _on_body(first), _on_body(second)
-    steps = pose(second, STEP) if STEP in second else None
+    steps = pose(second, STEP) if step is None and STEP in second else step
     if steps is None:
         if T_1B is None or T_2B is None:
             raise ForeignFileError(
@@ -81,7 +119,7 @@ def pair(first: Named, second: Named) -> Rig:
                 due=f"{STEP} is due, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of both cameras",
             )
         steps = se3.compose(T_2B, se3.inverse(T_1B))
-    elif T_1B is not None and T_2B is not None:
+    elif step is None and T_1B is not None and T_2B is not None:
         _require_same(second, steps, se3.compose(T_2B, se3.inverse(T_1B)))
     rig = Rig.of_cameras(second.path, _lens(first), _lens(second), steps, T_1B)
     offset = _offset(second if rig.swapped else first)

@@ -6,10 +6,13 @@ T_SC brings points of the camera to the IMU; a picture was taken its delay befor
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pelorus import se3
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Noise
 from pelorus.named import Named, as_numbers
+from pelorus.rig import several
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.kalibr import pose
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
@@ -39,17 +42,18 @@ def is_config(content: Named) -> bool:
     )
 
 
-def read(content: Named) -> Rig:
-    """Of the first two cameras."""
+def read(content: Named, asked: Sequence[str] = ()) -> Rig:
+    """Of two cameras: those asked for by number, else the two that are a pair."""
     cameras = [
         Named(content.path, one, f"cameras[{k}]") for k, one in enumerate(content.get("cameras"))
     ]
     if len(cameras) < 2:
         raise ForeignFileError(content.path, "has one camera", due="two are due")
-    first, second = cameras[:2]
-    T_S1, T_S2 = pose(first, "T_SC"), pose(second, "T_SC")
-    T_21 = se3.compose(se3.inverse(T_S2), T_S1)
-    rig = Rig.of_cameras(content.path, _lens(first), _lens(second), T_21, se3.inverse(T_S1))
+    known = [
+        several.Camera((f"cam{k}",), _lens(camera), se3.inverse(pose(camera, "T_SC")))
+        for k, camera in enumerate(cameras)
+    ]
+    rig = several.rig(content.path, known, asked)
     name = next((name for name in IMU if name in content), "")
     told = {}
     if name:

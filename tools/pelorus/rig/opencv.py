@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """OpenCV's stereo calibration: K1 D1 K2 D2 R T, in one file or in two (intrinsics, extrinsics).
 
-R and T bring points of the first camera to the second one (stereoCalibrate).
+R and T (or t) bring points of the first camera to the second one (stereoCalibrate).
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ MATRICES = ("K{}", "M{}", "CM{}", "cameraMatrix{}", "CameraMatrix{}", "camera_ma
 DISTORTIONS = ("D{}", "distCoeffs{}", "DistCoeffs{}", "dist_coeffs{}", "distortion{}")
 SIDES = (("1", "2"), ("_1", "_2"), ("L", "R"), ("_left", "_right"), ("Left", "Right"))
 LENSES = (LensModel.NONE, LensModel.RADTAN, LensModel.EQUIDISTANT)
+SHIFTS = ("T", "t")
 SIZES = ("imageSize", "image_size")
 FISHEYE_OR_NOT = 4  # so many coefficients both have
 
@@ -32,14 +33,14 @@ FISHEYE_OR_NOT = 4  # so many coefficients both have
 def is_opencv(content: Named) -> bool:
     """Of a stereo calibration the cameras, or where they stand."""
     has_one = any(pattern.format(side[0]) in content for pattern in MATRICES for side in SIDES)
-    return has_one or ("R" in content and "T" in content)
+    return has_one or ("R" in content and any(name in content for name in SHIFTS))
 
 
 def stereo(content: Named, model: LensModel | None) -> Rig:
     """`model` is asked for where the number of coefficients does not tell."""
     T_21 = Poses(
         se3.nearest_rotation(arrays.rotation(content.path, "R", matrix(content, "R", 3, 3))),
-        _column(content, "T"),
+        _column(content, next((name for name in SHIFTS if name in content), SHIFTS[0])),
     )
     return Rig.of_cameras(content.path, _lens(content, 1, model), _lens(content, 2, model), T_21)
 

@@ -17,12 +17,26 @@ from pelorus import calibration, foreign
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Camera, Header, header_name
 from pelorus.named import Named
-from pelorus.rig import basalt, camera_info, kalibr, okvis, opencv, orb_slam, vins, zed
+from pelorus.rig import (
+    basalt,
+    camera_info,
+    depthai,
+    kalibr,
+    okvis,
+    opencv,
+    orb_slam,
+    svo,
+    vins,
+    zed,
+)
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.lens import LensModel
 from pelorus.rig.rig import Rig
 
 SECTION = re.compile(r"\[\w+\]\s*$")
+
+# In OpenVINS' estimator_config.yaml: Kalibr's files, beside it.
+ELSEWHERE = ("relative_config_imucam", "relative_config_imu")
 
 NO_CAMERA = Camera(fx_px=1.0, fy_px=1.0, cx_px=0.0, cy_px=0.0, baseline_m=1.0)
 
@@ -34,10 +48,11 @@ class Calibrated:
     header: Header
     rig: Rig | None = None
     imu: ImuModel = field(default_factory=ImuModel)
+    chosen: tuple[str, ...] = ()  # what is said of the choice of cameras
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        return self.imu.remarks
+        return (*self.chosen, *self.imu.remarks)
 
 
 def is_own(paths: Sequence[Path]) -> bool:
@@ -53,15 +68,18 @@ def read(
     name: str,
     extrinsic: Path | None = None,
     lens: LensModel | None = None,
+    cameras: Sequence[str] = (),
 ) -> Calibrated:
-    """`extrinsic` says where the left camera sits on the body, whatever the other files say."""
+    """`extrinsic` says where the left camera sits on the body, whatever the other files say;
+    `cameras` names two where a file has more.
+    """
     if is_own(paths):
         header = calibration.read(paths[0])
         if extrinsic is not None:
             T = calibration.read_extrinsic(extrinsic)
             header = replace(header, R_CB=T.R, t_CB_m=T.p)
         return Calibrated(header)
-    return of_rig(read_rig(paths, lens), name, extrinsic)
+    return of_rig(read_rig(paths, lens, cameras), name, extrinsic)
 
 
 def without_cameras(paths: Sequence[Path], name: str) -> Calibrated:
@@ -71,7 +89,7 @@ def without_cameras(paths: Sequence[Path], name: str) -> Calibrated:
     """
     if is_own(paths):
         return read(paths, name)
-    contents = [_content(path) for path in paths]
+    contents = _contents(paths)
     if any(kind.is_one(content) for content in contents for kind in KINDS):
         return read(paths, name)
     if any(not kalibr.is_imu(content) for content in contents) or len(contents) > 1:
@@ -86,12 +104,14 @@ def of_rig(rig: Rig, name: str, extrinsic: Path | None = None) -> Calibrated:
         rig = rig.on_body(calibration.read_extrinsic(extrinsic))
     header = rig.header(rig.rectification(), name)
     plain = rig.is_rectified and not rig.offset_s and not rig.others
-    return Calibrated(header, None if plain else rig, rig.imu)
+    return Calibrated(header, None if plain else rig, rig.imu, rig.remarks)
 
 
-def read_rig(paths: Sequence[Path], lens: LensModel | None = None) -> Rig:
+def read_rig(
+    paths: Sequence[Path], lens: LensModel | None = None, cameras: Sequence[str] = ()
+) -> Rig:
     """What one file or several say together."""
-    contents = [_content(path) for path in paths]
+    contents = _contents(paths)
     kinds = [next((kind for kind in KINDS if kind.is_one(one)), None) for one in contents]
     for content, kind in zip(contents, kinds, strict=True):
         if kind is None and not kalibr.is_imu(content):
@@ -107,19 +127,50 @@ def read_rig(paths: Sequence[Path], lens: LensModel | None = None) -> Rig:
     if any(kind is not found[0] for kind in found):
         names = " and ".join(dict.fromkeys(kind.name for kind in found))
         raise ForeignFileError(paths[0], f"and the others are {names}", due="files of one are due")
-    cameras = [content for content, kind in zip(contents, kinds, strict=True) if kind is not None]
-    if len(cameras) not in found[0].files:
+    files = [content for content, kind in zip(contents, kinds, strict=True) if kind is not None]
+    if len(files) not in found[0].files:
         due = " or ".join(map(str, found[0].files))
         raise ForeignFileError(
-            cameras[-1].path,
-            f"{len(cameras)} files of cameras",
+            files[-1].path,
+            f"{len(files)} files of cameras",
             due=f"{due} of {found[0].name} are due",
         )
-    rig = found[0].read(cameras, lens)
+    rig = found[0].read(files, lens, cameras)
     imus = [content for content, kind in zip(contents, kinds, strict=True) if kind is None]
     if len(imus) > 1:
         raise ForeignFileError(imus[1].path, "is the second file of an IMU", due="one is due")
     return kalibr.with_imu(rig, imus[0]) if imus else rig
+
+
+def topics(paths: Sequence[Path]) -> set[str]:
+    """Of pictures, that these files name."""
+    return {topic for content in _contents(paths) for topic in kalibr.topics(content)}
+
+
+def are_of_imu(paths: Sequence[Path]) -> bool:
+    """Whether these files are of an IMU alone: the cameras are told elsewhere."""
+    contents = _contents(paths)
+    return bool(contents) and all(
+        kalibr.is_imu(content) and not any(kind.is_one(content) for kind in KINDS)
+        for content in contents
+    )
+
+
+def with_imu(rig: Rig, paths: Sequence[Path]) -> Rig:
+    """The rig on the IMU that the one file of these describes."""
+    if len(paths) > 1:
+        raise ForeignFileError(paths[1], "is the second file of an IMU", due="one is due")
+    return kalibr.with_imu(rig, _content(paths[0]))
+
+
+def _contents(paths: Sequence[Path]) -> list[Named]:
+    """Of the files; in place of one that only names others beside it, of these."""
+    found: list[Named] = []
+    for path in paths:
+        content = _content(path)
+        named = [str(content.content[name]) for name in ELSEWHERE if name in content]
+        found += [_content(path.parent / name) for name in named] if named else [content]
+    return found
 
 
 def _content(path: Path) -> Named:
@@ -141,33 +192,42 @@ class Kind(NamedTuple):
     name: str
     is_one: Callable[[Named], bool]
     files: tuple[int, ...]
-    read: Callable[[list[Named], LensModel | None], Rig]
+    read: Callable[[list[Named], LensModel | None, Sequence[str]], Rig]
 
 
-def _opencv(contents: list[Named], lens: LensModel | None) -> Rig:
+def _opencv(contents: list[Named], lens: LensModel | None, _: Sequence[str]) -> Rig:
     merged = {name: value for content in contents for name, value in content.content.items()}
     return opencv.stereo(Named(contents[0].path, merged), lens)
 
 
 # In this order: a name that several use is asked for last.
 KINDS = (
-    Kind("Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _: kalibr.camchain(c[0])),
-    Kind("sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, _: kalibr.pair(*c)),
+    Kind("Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _, of: kalibr.camchain(c[0], of)),
+    Kind("sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, *_: kalibr.pair(*c)),
     Kind(
         "camera_info of ROS",
         camera_info.is_camera_info,
         (2,),
-        lambda c, lens: camera_info.pair(c[0], c[1], lens),
+        lambda c, lens, _: camera_info.pair(c[0], c[1], lens),
     ),
-    Kind("ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, _: orb_slam.read(c[0])),
+    Kind("ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, *_: orb_slam.read(c[0])),
     Kind(
         "VINS-Fusion's configuration",
         lambda content: vins.is_config(content) or vins.is_camera(content),
         (1, 2, 3),
-        lambda c, _: vins.read(c),
+        lambda c, *_: vins.read(c),
     ),
-    Kind("Basalt's calibration", basalt.is_calibration, (1,), lambda c, _: basalt.read(c[0])),
-    Kind("OKVIS's configuration", okvis.is_config, (1,), lambda c, _: okvis.read(c[0])),
-    Kind("a ZED's .conf", zed.is_conf, (1,), lambda c, _: zed.read(c[0])),
+    Kind(
+        "Basalt's calibration", basalt.is_calibration, (1,), lambda c, _, of: basalt.read(c[0], of)
+    ),
+    Kind("OKVIS's configuration", okvis.is_config, (1,), lambda c, _, of: okvis.read(c[0], of)),
+    Kind("SVO's or maplab's rig", svo.is_rig, (1,), lambda c, _, of: svo.read(c[0], of)),
+    Kind(
+        "DepthAI's calibration",
+        depthai.is_calibration,
+        (1,),
+        lambda c, _, of: depthai.read(c[0], of),
+    ),
+    Kind("a ZED's .conf", zed.is_conf, (1,), lambda c, *_: zed.read(c[0])),
     Kind("OpenCV's stereo calibration", opencv.is_opencv, (1, 2), _opencv),
 )

@@ -38,6 +38,7 @@ class Rig:
     topics: tuple[str, ...] = ()  # of the left and the right camera, where the file names them
     T_LF: Poses = se3.IDENTITY  # from the frame that its messages name: rectified, it is turned
     others: tuple[Rig, ...] = ()  # of the same cameras at other resolutions
+    remarks: tuple[str, ...] = ()  # of the choice of cameras, where there are more than two
 
     @classmethod
     def of_cameras(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import arrays, foreign, motion
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, resolved
 from pelorus.extras import extra
 from pelorus.foreign import ForeignFileError
 from pelorus.motion import Times
@@ -45,7 +45,7 @@ def pairs(left: Path, right: Path, remarks: list[str] | None = None) -> list[Pai
     """By equal names, sorted; the files' endings may differ. With `remarks` a few may lack their
     partner, and that is said: for names that are times, so that the others keep theirs.
     """
-    if left.resolve() == right.resolve():
+    if resolved(left) == resolved(right):
         raise PelorusError(f"{left}: is given as the left and as the right folder; two are due")
     lefts, rights = pictures(left), pictures(right)
     alone = lefts.keys() ^ rights.keys()
