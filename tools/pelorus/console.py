@@ -12,11 +12,15 @@ import math
 import unicodedata
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import track
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from pelorus.check.verdict import Verdict
 
 Item = TypeVar("Item")
 
@@ -78,6 +82,19 @@ def leave_standard_output() -> None:
 def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterator[Item]:
     """A bar on a terminal, nothing elsewhere."""
     yield from track(items, what, total, console=err, transient=True, disable=not err.is_terminal)
+
+
+VERDICT_COLOURS = {"good": "green", "care": "yellow", "bad": "red"}
+
+
+def tell_verdict(verdict: Verdict) -> None:
+    """In its colour, with the reasons and what to set: the first lines of every command that has
+    one.
+    """
+    head, *why = verdict.lines()
+    out.print(f"[bold {VERDICT_COLOURS[verdict.mark]}]{escape(head)}[/]")
+    for words in why:
+        out.print(escape(words))
 
 
 @contextmanager

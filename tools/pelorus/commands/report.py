@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out, print_json, progress
+from pelorus.console import err, out, print_json, progress, tell_verdict, waiting
 from pelorus.errors import Existing, made, whole_folder
 from pelorus.extras import figures_missing
 from pelorus.replay import find_programs
@@ -20,6 +20,7 @@ from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
 
 if TYPE_CHECKING:
+    from pelorus.check.verdict import Verdict
     from pelorus.report.comparison import Comparison
 
 PAGE = "report.html"
@@ -79,12 +80,12 @@ def report(
         from pelorus.report.comparison import Comparison  # noqa: PLC0415 - scipy loads slowly
 
         compared = Comparison(subject, runs)
-        lines = _draw(compared, part, pictures, calibration)
+        verdict, lines = _draw(compared, part, pictures, calibration)
         _remove_pictures(folder)
     if as_json:
-        print_json(_json(compared, lines, folder / PAGE))
+        print_json(_json(compared, verdict, lines, folder / PAGE))
     else:
-        _tell(compared, lines, folder / PAGE)
+        _tell(compared, verdict, lines, folder / PAGE)
 
 
 def _remove_pictures(folder: Path) -> None:
@@ -95,8 +96,9 @@ def _remove_pictures(folder: Path) -> None:
 
 def _draw(
     compared: Comparison, folder: Path, source: Path | None, calibration: list[Path]
-) -> list[str]:
-    """The pictures and the page; the verdicts on it."""
+) -> tuple[Verdict, list[str]]:
+    """The pictures and the page; the verdict on it, and what is off besides."""
+    from pelorus.check.verdict import verdict_of_log  # noqa: PLC0415 - scipy loads slowly
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page  # noqa: PLC0415 - as above
     from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
@@ -104,8 +106,10 @@ def _draw(
     from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
     shown = _draw_pictures(compared, folder)
-    lines = words.verdicts(compared)
+    lines = words.remarks(compared)
     main = compared.main
+    with waiting("the verdict"):
+        verdict = verdict_of_log(main.messages)
     others = {
         run.name: Other(run.trajectory, compared.accuracy.get(run.name))
         for run in compared.runs
@@ -114,11 +118,11 @@ def _draw(
     curves = Curves(main.messages, compared.subject.truth, others)
     found = explain(main.messages)
     drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
-    answer = answers.of_comparison(compared, lines, found, shown, drift)
+    answer = answers.of_comparison(compared, verdict, lines, found, shown, drift)
     if source is not None:
         answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
     page.write(folder / PAGE, answer, curves)
-    return lines
+    return verdict, lines
 
 
 def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, Path]]:
@@ -138,18 +142,20 @@ def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, P
     return shown
 
 
-def _json(compared: Comparison, lines: list[str], page: Path) -> dict[str, Any]:
+def _json(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) -> dict[str, Any]:
     """The same as `_tell`, and all figures of each run."""
     return {
         "report": str(page),
         "recording": str(compared.subject.path),
-        "verdicts": lines,
+        **verdict.json(),
+        "remarks": lines,
         "health": compared.main.health.told(compared.origin_ns),
         "runs": {run.name: run.summary for run in compared.runs},
     }
 
 
-def _tell(compared: Comparison, lines: list[str], page: Path) -> None:
+def _tell(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) -> None:
+    tell_verdict(verdict)
     rows = (words.titles(compared), *(words.row(compared, run) for run in compared.runs))
     head, *figures = zip(*rows, strict=True)
     table = Table(box=None, pad_edge=False)  # a column a run: that fits on the narrowest terminal
