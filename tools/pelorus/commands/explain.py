@@ -13,7 +13,6 @@ from pelorus.console import out, print_json, tell_verdict, waiting
 from pelorus.replay import whole_log_of
 
 if TYPE_CHECKING:
-    from pelorus.check.verdict import Verdict
     from pelorus.explain import Explanation
     from pelorus.frames import Message
 
@@ -53,8 +52,7 @@ def explain(
     the motion is measured anew from the stereo pairs and held against the odometry. What begins an
     episode is its first cause. It says as well what is wrong all along, such as settings.
     """
-    from pelorus.check.verdict import verdict_of_log  # noqa: PLC0415 - scipy loads slowly
-    from pelorus.explain import explain as explained  # noqa: PLC0415 - as above
+    from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
 
     if page is None and (beside is not None or beside_settings or pictures is not None):
         where = "--beside / --beside-set / --pictures"
@@ -62,14 +60,15 @@ def explain(
     options = replay_options(config, settings)
     messages = whole_log_of(source, options, programs)
     with waiting(f"explaining {source.name}"):
-        verdict, found = verdict_of_log(messages), explained(messages)
+        found = explained(messages)
+        verdict = found.verdict
     if page is not None:
         other = None
         if beside is not None or beside_settings:
             changed = replay_options(None, beside_settings, "--beside-set")
             named = ", ".join(beside_settings) or str(beside)
             other = named, whole_log_of(beside or source, [*options, *changed], programs)
-        _write(page, source.name, verdict, found, messages, other, pictures, calibration)
+        _write(page, source.name, found, messages, other, pictures, calibration)
     if as_json:
         print_json({**verdict.json(), **found.json()})
         return
@@ -81,7 +80,6 @@ def explain(
 def _write(
     page: Path,
     name: str,
-    verdict: Verdict,
     found: Explanation,
     messages: list[Message],
     other: tuple[str, list[Message]] | None,
@@ -107,7 +105,7 @@ def _write(
         second = Told(other[0], explained(other[1]), there.accuracy, other[1])
         tables = [*side_by_side(first, second), *drift_table([first, second])]
         facts = f"Dashed curves are those of {other[0]}."
-    answer = answers.of_explanation(verdict, found, name, tables, facts)
+    answer = answers.of_explanation(found, name, tables, facts)
     if pictures is not None:
         answer = answers.with_footage(answer, footage(messages, found, pictures, calibration))
     write(page, answer, curves)

@@ -98,7 +98,6 @@ def _draw(
     compared: Comparison, folder: Path, source: Path | None, calibration: list[Path]
 ) -> tuple[Verdict, list[str]]:
     """The pictures and the page; the verdict on it, and what is off besides."""
-    from pelorus.check.verdict import verdict_of_log  # noqa: PLC0415 - scipy loads slowly
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page  # noqa: PLC0415 - as above
     from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
@@ -108,8 +107,6 @@ def _draw(
     shown = _draw_pictures(compared, folder)
     lines = words.remarks(compared)
     main = compared.main
-    with waiting("the verdict"):
-        verdict = verdict_of_log(main.messages)
     others = {
         run.name: Other(run.trajectory, compared.accuracy.get(run.name))
         for run in compared.runs
@@ -117,8 +114,10 @@ def _draw(
     }
     curves = Curves(main.messages, compared.subject.truth, others)
     found = explain(main.messages)
+    with waiting("judging"):
+        verdict = found.verdict
     drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
-    answer = answers.of_comparison(compared, verdict, lines, found, shown, drift)
+    answer = answers.of_comparison(compared, lines, found, shown, drift)
     if source is not None:
         answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
     page.write(folder / PAGE, answer, curves)

@@ -130,6 +130,7 @@ class Streams:
     truth: Trajectory | None = None
     small: list[Reading] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    settings: dict[str, float] = field(default_factory=dict)  # what is known of the filter's
     on_earth: bool = False  # its positions are east, north and up of a place
 
     @property
@@ -212,7 +213,14 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
     # with its first twist or reading the filter begins
     small = [reading for reading in streams.small if reading.t_ns >= first_ns]
     return Recording(
-        header, *moved, t_ns, tracks, readings=small, remarks=remarks, inertial=inertial
+        header,
+        *moved,
+        t_ns,
+        tracks,
+        readings=small,
+        remarks=remarks,
+        inertial=inertial,
+        settings=streams.settings,
     )
 
 

@@ -22,8 +22,8 @@ UNEXPLAINED_MOST = 20  # spells that are told on a page
 MEANING = (
     "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
     "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is expected. "
-    "Used and gated: observations. Map, where it has columns: RMS distance of the landmarks from where "
-    "the recording knows them to be, with its NEES an axis. Poses that were given, in mode "
+    "Used and gated: observations. Map, where it has columns: RMS distance of the landmarks from "
+    "where the recording knows them to be, with its NEES an axis. Poses that were given, in mode "
     "mapping, have no error. The last column: time of the recording over time of the computing. "
     "Yours is the filter with the settings that were given, in float32 like dead reckoning, which "
     "is the twists alone."
@@ -44,13 +44,13 @@ def with_footage(answer: Answer, shown: Footage) -> Answer:
 
 
 def of_explanation(
-    verdict: Verdict,
     found: Explanation,
     title: str,
     tables: Sequence[Table] = (),
     facts: str = "",
 ) -> Answer:
     """Of a log."""
+    verdict = found.verdict
     return Answer(
         title,
         verdict.mark,
@@ -91,7 +91,6 @@ def _event(found: Explanation, episode: Episode) -> Event:
 
 def of_comparison(
     compared: Comparison,
-    verdict: Verdict,
     lines: Sequence[str],
     found: Explanation,
     pictures: Sequence[tuple[str, str, Path]],
@@ -107,11 +106,11 @@ def of_comparison(
     ]
     return Answer(
         f"Pelorus report: {compared.subject.title}",
-        verdict.mark,
-        _sentence(verdict.words),
+        found.verdict.mark,
+        _sentence(found.verdict.words),
         _facts(compared),
-        [*_why(verdict), _sentence(found.lines()[0]), *lines, *found.setup],
-        changes=_settings(verdict),
+        [*_why(found.verdict), _sentence(found.lines()[0]), *lines, *found.setup],
+        changes=_settings(found.verdict),
         events=_events(found),
         tables=[Table("Runs", rows, meaning), *tables],
         pictures=pictures,

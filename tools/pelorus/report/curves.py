@@ -22,7 +22,7 @@ from pelorus.evidence import Evidence
 from pelorus.frame_table import FrameTable, frame_table
 from pelorus.frames import Message, Truth, TruthKnows
 from pelorus.grid.plane import AXES, choose
-from pelorus.health import GOOD, SHORT
+from pelorus.health import GOOD, NOT_STARTED, SHORT
 from pelorus.layout import Floats, stacked
 from pelorus.motion import Times, nearest
 from pelorus.report.landmarks import WHY, Landmarks, packed
@@ -102,7 +102,7 @@ class Curves:
         """All of it but the columns."""
         return {
             "t": self.packer.add_exactly(np.round(self._t * 1e3), "u4"),  # ms
-            "health": self.packer.add_exactly(self._frames["health"], "u1"),
+            "health": self.packer.add_exactly(_shown_health(self._frames), "u1"),
             "reasons": self.packer.add_exactly(self._frames.reasons, "u4"),
             "status": self.packer.add_exactly(self._frames["status"] + 128, "u1"),
             **self._health_beside(),
@@ -117,7 +117,7 @@ class Curves:
     def _health_beside(self) -> dict[str, Any]:
         if self._beside is None:
             return {}
-        there = self._at_own(self._beside, self._beside._frames["health"])
+        there = self._at_own(self._beside, _shown_health(self._beside._frames))
         known = np.where(np.isnan(there), NO_HEALTH, there)
         return {"health_beside": self.packer.add_exactly(known, "u1")}
 
@@ -390,6 +390,12 @@ class Curves:
 _PARTS = (slice(0, 3), slice(3, 6))
 
 
+def _shown_health(frames: FrameTable) -> Floats:
+    """As told; what waits for its start has lost nothing yet."""
+    begun = np.logical_or.accumulate(frames.reasons & NOT_STARTED == 0)
+    return np.where(begun, frames["health"], len(schema.HEALTHS))
+
+
 def _words() -> dict[str, Any]:
     reasons = {
         str(bit.bit_length() - 1): SHORT.get(name, schema.REASONS[bit])
@@ -397,7 +403,7 @@ def _words() -> dict[str, Any]:
     }
     harmless = [k for k in range(32) if schema.LIMITS["harmless_reasons"] >> k & 1]
     return {
-        "health": list(schema.HEALTHS.values()),
+        "health": [*schema.HEALTHS.values(), "not started"],
         "reasons": reasons,
         "harmless": harmless,
         "status": {str(k): words.partition(":")[0] for k, words in schema.STATUSES.items()},
