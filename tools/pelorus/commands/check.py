@@ -101,6 +101,7 @@ def _write(
     messages = wire.messages_of(outputs.log)
     explained = explain(messages)
     answer = answers.of_check(found, recording.name, explained)
+    answer = answers.with_setup(answer, messages)
     if pictures is not None:
         answer = answers.with_footage(answer, footage(messages, explained, pictures, calibration))
     write(page, answer, Curves(messages))

@@ -106,6 +106,7 @@ def _write(
         tables = [*side_by_side(first, second), *drift_table([first, second])]
         facts = f"Dashed curves are those of {other[0]}."
     answer = answers.of_explanation(found, name, tables, facts)
+    answer = answers.with_setup(answer, messages)
     if pictures is not None:
         answer = answers.with_footage(answer, footage(messages, found, pictures, calibration))
     write(page, answer, curves)

@@ -118,6 +118,7 @@ def _draw(
         verdict = found.verdict
     drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
+    answer = answers.with_setup(answer, main.messages)
     if source is not None:
         answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
     page.write(folder / PAGE, answer, curves)

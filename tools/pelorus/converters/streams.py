@@ -130,8 +130,8 @@ class Streams:
     truth: Trajectory | None = None
     small: list[Reading] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
-    settings: dict[str, float] = field(default_factory=dict)  # what is known of the filter's
     on_earth: bool = False  # its positions are east, north and up of a place
+    settings: dict[str, float] = field(default_factory=dict)  # what is known of the filter's
 
     @property
     def told(self) -> list[str]:

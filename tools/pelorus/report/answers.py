@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING
 
 from pelorus.check.verdict import NOISES, Verdict
 from pelorus.explain.explanation import Episode, Explanation
+from pelorus.explain.log import log_of
+from pelorus.frames import Message
+from pelorus.report.about import tables_of
 from pelorus.report.footage import CAPTION, Footage
 from pelorus.report.page import Answer, Event, Table
+from pelorus.report.spectra import drawings
 
 if TYPE_CHECKING:
     from pelorus.check.checked import Checked
@@ -41,6 +45,12 @@ def with_footage(answer: Answer, shown: Footage) -> Answer:
         f"{len(shown.moments)} of {shown.frames} frames are shown: events, and some all along."
     )
     return replace(answer, moments=shown.moments, about_moments=f"{left_out} {CAPTION}")
+
+
+def with_setup(answer: Answer, messages: Sequence[Message]) -> Answer:
+    """The same with settings, calibration and remarks, and with what no time runs through."""
+    drawn = tuple(drawings(log_of(messages)))
+    return replace(answer, tables=[*answer.tables, *tables_of(messages)], drawings=drawn)
 
 
 def of_explanation(

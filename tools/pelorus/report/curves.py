@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from pelorus import schema
@@ -36,6 +37,7 @@ FRAMES_MOST = 150_000  # two hours at 20 Hz
 BESIDE = "beside"  # what curves of another log are called
 NO_HEALTH = 255
 NOTHING = "Nothing to draw: in no frame of this log is it known and not zero."
+TURNS = ("roll", "pitch", "yaw")
 SHAPES = 200  # ellipsoids along the way
 INSIDE = (
     "In body axes, first poses aligned, and three sigma of the filter's own covariance: an honest "
@@ -125,6 +127,7 @@ class Curves:
 
     def _charts(self) -> Iterator[dict[str, Any]]:
         yield from self._errors()
+        yield from self._motion()
         yield self._innovations()
         yield from self._biases()
         yield from self._observations()
@@ -228,6 +231,19 @@ class Curves:
         same = t_ns[order][at] == self._frames.t_ns
         out[same] = values[order[at[same]]]
         return out
+
+    def _motion(self) -> Iterator[dict[str, Any]]:
+        """How the body goes and how it is turned, beside the truth where there is one."""
+        frames = self._frames
+        v = [(axis, frames[f"v{axis}_mps"]) for axis in AXES]
+        yield self._chart("Velocity", "m/s", "Of the body, along its own axes.", v)
+        lines = list(zip(TURNS, _turns_deg(frames.stack("qx", "qy", "qz", "qw")).T, strict=True))
+        about = "Of the body in the world: about its x, y and z axes, the last one first."
+        if self.accuracy is not None:
+            true = _turns_deg(Rotation.from_matrix(self.accuracy.truth.R).as_quat())
+            true = self._spread(self.accuracy.t_ns, true)
+            lines += [(f"{name} true", true[:, k]) for k, name in enumerate(TURNS)]
+        yield self._chart("Roll, pitch, yaw", "deg", about, lines)
 
     def _innovations(self) -> dict[str, Any]:
         dof = self._frames["nis_dof"]
@@ -394,6 +410,16 @@ def _shown_health(frames: FrameTable) -> Floats:
     """As told; what waits for its start has lost nothing yet."""
     begun = np.logical_or.accumulate(frames.reasons & NOT_STARTED == 0)
     return np.where(begun, frames["health"], len(schema.HEALTHS))
+
+
+def _turns_deg(quaternion: Floats) -> Floats:
+    """(n, 3) roll, pitch and yaw; NaN where there is none."""
+    out = np.full((len(quaternion), 3), np.nan)
+    known = np.isfinite(quaternion).all(axis=1)
+    if known.any():
+        turned = Rotation.from_quat(quaternion[known]).as_euler("ZYX", degrees=True)
+        out[known] = turned[:, ::-1]
+    return out
 
 
 def _words() -> dict[str, Any]:
