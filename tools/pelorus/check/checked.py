@@ -19,7 +19,7 @@ from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
 from pelorus.check.verdict import Remark, Run, Verdict, of_search, verdict_of
-from pelorus.console import progress
+from pelorus.console import progress, step
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
 from pelorus.faults.named import judged_of
@@ -27,6 +27,7 @@ from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
 
 SPELLS_SHOWN = 12
+STEPS = 5
 NAMED = "a fault is named first"
 NOTHING_USED = "no frame could be used"  # words of pelorus-replay
 
@@ -73,11 +74,13 @@ class Checked:
 
 def check(program: Path, recording: Path, given: Settings, folder: Path) -> Checked:
     """Tune in the folder, then replay the whole recording with both settings."""
+    step("faults of the recording")
     bench = Bench(program, recording, folder, given.get("process", ""))
     messages = wire.messages_of(recording)
     known = Known(judged_of(messages, bench.examined), None, bench.examined)
     if known.is_stopped:
         return Checked(verdict_of(None, known), None, [], [], [], [], None)
+    step("noises, clock and biases")
     one_clock = all(fault.name != "clock-turns" for fault in known.faults)
     found = tune(bench, without_clock(given), one_clock)
     if "calibrate" in given:
@@ -85,9 +88,12 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if any(fault.lasts for fault in known.faults):
         found.lasting.append(NAMED)
     known = replace(known, noise=found.noise)
+    step("held against yours")
     tuned = held_against(bench, given, found)
+    step("errors that points share")
     tuned = with_halves_alike(bench, with_shared_rows(bench, tuned))
     truth = truth_in(messages)
+    step("the verdict")
     both = progress((("before", given), ("after", tuned.settings)), "whole drive")
     before, run = (_whole(program, recording, settings, folder, name) for name, settings in both)
     if run is None:

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, settings_given
-from pelorus.console import VERDICT_COLOURS, out, print_json
+from pelorus.console import VERDICT_COLOURS, out, print_json, steps
 from pelorus.errors import write_text
 from pelorus.replay import find_programs
 
@@ -58,7 +58,7 @@ def check(
         raise typer.BadParameter("are seen on a --page alone", param_hint="--pictures")
     given = settings_given(config, settings)
     program = find_programs(programs).float32
-    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+    with steps(checked.STEPS), tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         found = checked.check(program, recording, given, Path(folder))
         if page is not None:
             _write(page, found, recording, program, Path(folder), pictures, calibration)

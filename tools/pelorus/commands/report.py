@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out, print_json, progress, tell_verdict, waiting
+from pelorus.console import err, out, print_json, progress, step, steps, tell_verdict, waiting
 from pelorus.errors import Existing, made, whole_folder
 from pelorus.extras import figures_missing
 from pelorus.replay import find_programs
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pelorus.report.comparison import Comparison
 
 PAGE = "report.html"
+STEPS = 3
 DRAWINGS = ("map", "covariance", "top-view", "hero")  # that a recording may have
 OLDER = (  # pictures of earlier versions, which would be taken for this report's
     *("error-yours", "error-world", "error-course", "nees", "bias", "observations", "time"),
@@ -73,7 +74,8 @@ def report(
     require_twists(subject, also)
     options = replay_options(config, settings)
     plans = plan_runs(find_programs(programs), recording, options, also)
-    with whole_folder(folder) as part:
+    with steps(STEPS), whole_folder(folder) as part:
+        step("replaying")
         runs_folder = made(part / "runs")
         runs = [carry_out(plan, subject, runs_folder) for plan in progress(plans, "replaying")]
 
@@ -104,6 +106,7 @@ def _draw(
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
     from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
+    step("pictures")
     shown = _draw_pictures(compared, folder)
     lines = words.remarks(compared)
     main = compared.main
@@ -113,6 +116,7 @@ def _draw(
         if run is not main
     }
     curves = Curves(main.messages, compared.subject.truth, others)
+    step("the verdict")
     found = explain(main.messages)
     with waiting("judging"):
         verdict = found.verdict

@@ -38,11 +38,11 @@ def view(
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
 ) -> None:
-    """A log in three dimensions and over time, in Rerun or Foxglove.
+    r"""A log in three dimensions and over time, in Rerun or Foxglove.
 
     Pose with its three-sigma ellipsoid, way, truth, landmarks with theirs, points in the picture
     with those that were rejected, health and why, innovations, biases, what the supervisor saw,
-    computing time. It needs `pip install 'pelorus[view]'`. While a robot drives, `pelorus stream
+    computing time. It needs `pip install 'pelorus\[view]'`. While a robot drives, `pelorus stream
     --view` shows the same.
     """
     if not (rrd or mcap or spawn or connect):

@@ -40,7 +40,7 @@ def _spectra(log: Log) -> Iterator[Drawing]:
     rate_hz = 1e9 / float(np.median(np.diff(t_ns)))
     about = (
         f"Of {len(t_ns)} readings at {rate_hz:.0f} Hz (Welch). Peaks are motors, propellers, a "
-        "loose mount; what lies above half the rate folds back into it. The noise that is set is flat."
+        "loose mount; what lies above half the rate folds back. The noise that is set is flat."
     )
     for name, unit, columns in (
         ("Vibration: specific force", "m/s²/√Hz", slice(0, 3)),
