@@ -134,7 +134,8 @@ def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iter
         return
     of = total if total is not None else len(items) if isinstance(items, Sized) else None
     for done, item in enumerate(items):
-        told.say(f"{label}, {done}{'' if of is None else f' of {of}'}")
+        if done:
+            told.say(f"{label}, {done}{f' of {of}' if of else ''}")
         yield item
 
 
