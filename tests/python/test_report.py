@@ -355,6 +355,24 @@ def test_reasons_are_those_of_the_library(name: str) -> None:
     assert getattr(words, name) == 1 << int(bit.group(1))
 
 
+def test_another_programs_way_stands_beside_the_drives_own(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path, way = recorded(tmp_path, drive()), tmp_path / "other.tum"
+    bin_ = ("--bin", programs.float32.parent)
+    pelorus("export", path, "--tum", way, *bin_)
+    rows = np.loadtxt(way)
+    rows[:, 1:4] += [100.0, -20.0, 3.0]  # in a world of its own
+    np.savetxt(way, rows, fmt="%.9f")
+    pelorus("report", path, "--out", tmp_path / "out", "--beside", way, *bin_)
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert '"name":"other"' in page
+    rows[:, 0] += 1e3
+    np.savetxt(way, rows, fmt="%.9f")
+    said = pelorus("report", path, "--out", tmp_path / "b", "--beside", way, *bin_, status=1)
+    assert "none of its times is that of a frame" in said.err
+
+
 def test_a_bias_that_is_suggested_and_not_estimated_is_told(
     tmp_path: Path, programs: Programs
 ) -> None:

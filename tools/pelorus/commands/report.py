@@ -13,18 +13,23 @@ from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import err, out, print_json, progress, step, steps, tell_verdict, waiting
-from pelorus.errors import Existing, made, whole_folder
+from pelorus.errors import Existing, PelorusError, made, whole_folder
 from pelorus.extras import figures_missing
 from pelorus.replay import find_programs
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
+from pelorus.trajectory import read_stamped
 
 if TYPE_CHECKING:
     from pelorus.check.verdict import Verdict
     from pelorus.report.comparison import Comparison
+    from pelorus.report.curves import Other
+    from pelorus.report.results import Run
+    from pelorus.trajectory import Trajectory
 
 PAGE = "report.html"
 STEPS = 3
+SAME_NS = 1_000_000  # times of another program's way that are a frame's
 DRAWINGS = ("map", "covariance", "top-view", "hero")  # that a recording may have
 OLDER = (  # pictures of earlier versions, which would be taken for this report's
     *("error-yours", "error-world", "error-course", "nees", "bias", "observations", "time"),
@@ -56,6 +61,12 @@ def report(
     ),
     settings: list[str] = SETTINGS,
     also: list[Also] = typer.Option([], help="One run more, for comparison; repeatable."),
+    beside: list[Path] = typer.Option(
+        [],
+        "--beside",
+        metavar="FILE.tum",
+        help="Another program's way of this drive, drawn and compared too; repeatable.",
+    ),
     pictures: Path | None = PICTURES,
     calibration: list[Path] = CALIBRATION,
     as_json: bool = typer.Option(False, "--json", help="What it tells as one JSON object."),
@@ -82,7 +93,8 @@ def report(
         from pelorus.report.comparison import Comparison  # noqa: PLC0415 - scipy loads slowly
 
         compared = Comparison(subject, runs)
-        verdict, lines = _draw(compared, part, pictures, calibration)
+        ways = {path.stem: read_stamped(path) for path in beside}
+        verdict, lines = _draw(compared, part, ways, pictures, calibration)
         _remove_pictures(folder)
     if as_json:
         print_json(_json(compared, verdict, lines, folder / PAGE))
@@ -97,7 +109,11 @@ def _remove_pictures(folder: Path) -> None:
 
 
 def _draw(
-    compared: Comparison, folder: Path, source: Path | None, calibration: list[Path]
+    compared: Comparison,
+    folder: Path,
+    ways: dict[str, Trajectory],
+    source: Path | None,
+    calibration: list[Path],
 ) -> tuple[Verdict, list[str]]:
     """The pictures and the page; the verdict on it, and what is off besides."""
     from pelorus.explain import explain  # noqa: PLC0415 - as above
@@ -115,6 +131,8 @@ def _draw(
         for run in compared.runs
         if run is not main
     }
+    for name, way in ways.items():
+        others[name] = _other(name, way, main, compared.subject.truth)
     curves = Curves(main.messages, compared.subject.truth, others)
     step("the verdict")
     found = explain(main.messages)
@@ -127,6 +145,17 @@ def _draw(
         answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
     page.write(folder / PAGE, answer, curves)
     return verdict, lines
+
+
+def _other(name: str, way: Trajectory, main: Run, truth: Trajectory | None) -> Other:
+    """Brought to the first common pose; PelorusError where there is none."""
+    from pelorus.evaluation import assess, beside  # noqa: PLC0415 - scipy loads slowly
+    from pelorus.report.curves import Other  # noqa: PLC0415 - as above
+
+    brought = beside(way, main.trajectory, SAME_NS)
+    if brought is None:
+        raise PelorusError(f"--beside {name}: none of its times is that of a frame")
+    return Other(brought, None if truth is None else assess(brought, truth))
 
 
 def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, Path]]:
