@@ -18,7 +18,7 @@ from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
-from pelorus.check.verdict import Remark, Run, Verdict, of_search, verdict_of
+from pelorus.check.verdict import Grade, Remark, Run, Verdict, of_search, verdict_of
 from pelorus.console import progress, step
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
@@ -51,6 +51,11 @@ class Checked:
     def remarks(self) -> list[Remark]:
         """Of the run, and of the search."""
         return [*self.verdict.remarks, *self.notes]
+
+    @property
+    def grade(self) -> Grade:
+        """Of the verdict."""
+        return self.verdict.grade
 
     @property
     def was(self) -> str:

@@ -99,6 +99,9 @@ class Verdict:
     noises: bool = False
     is_stopped: bool = False  # by a fault that must be mended first
 
+    def __str__(self) -> str:
+        return self.words
+
     @property
     def words(self) -> str:
         """No better than what the drive can tell."""

@@ -135,7 +135,10 @@ def _json(found: Checked, tuned: Path) -> dict[str, Any]:
         **found.verdict.json(),
         "as_given": None if found.as_given is None else found.as_given.words,
         "next": found.next_step(tuned),
-        "remarks": [{"grade": r.mark, "text": r.text} for r in found.remarks],
+        "remarks": [
+            {"grade": r.grade.name.lower(), "text": r.text, "note": r.is_note}
+            for r in found.remarks
+        ],
         "health": found.spells,
         "changes": found.changes,
         "figures": {title: {"before": a, "after": b} for title, a, b in found.rows},
