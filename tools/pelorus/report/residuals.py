@@ -23,6 +23,7 @@ BEFORE = 10  # frames
 SEEN_LEAST = 3  # times among them
 FAR_PX = 20.0  # a larger one is another point's
 NEAR_M = 1e-2
+REFINED = 3  # steps of Gauss and Newton
 FRAMES_MOST = 150  # that are looked at, evenly over the log
 
 
@@ -31,6 +32,14 @@ class Residuals(NamedTuple):
 
     pixels: Floats
     off: Floats
+
+
+class _View(NamedTuple):
+    """Points of a frame before, by their numbers in the frame that is looked at."""
+
+    point: NDArray[np.intp]
+    pixels: Floats
+    T_CW: Poses
 
 
 NOTHING = Residuals(np.empty((0, 4)), np.empty((0, 4)))
@@ -43,18 +52,16 @@ def residuals_of(log: Log, k: int) -> Residuals:
     if own is None or len(frames) < SEEN_LEAST:
         return NOTHING
     ids = log.frames[k].ids.astype(np.int64)
-    order = np.argsort(ids)
+    views = [_view(log, j, ids) for j in frames]
     sums = _Sums(len(ids))
-    for j in frames:
-        T_CW = _camera_pose(log, j)
-        assert T_CW is not None
-        then = log.frames[j].ids.astype(np.int64)
-        at = np.searchsorted(ids[order], then).clip(0, max(len(ids) - 1, 0))
-        known = ids[order][at] == then if len(ids) else np.zeros(len(then), bool)
-        pixels = log.frames[j].pixels.astype(np.float64)[known]
-        good = np.isfinite(pixels).all(axis=1) & (pixels[:, 0] > pixels[:, 2])
-        sums.add(order[at[known]][good], _rows(log, pixels[good], T_CW))
+    for view in views:
+        sums.add(view.point, _rows(log, view))
     p_W, told = sums.solved()
+    for _ in range(REFINED):  # the linear answer is too near: its rows hold the noise, too
+        sums = _Sums(len(ids))
+        for view in views:
+            sums.add(view.point, _about(log, view, p_W[view.point]))
+        p_W = p_W + np.where(told[:, None], sums.solved()[0], 0.0)
     seen = log.frames[k].pixels.astype(np.float64)
     off = seen - _projected(log, p_W, own)
     with np.errstate(invalid="ignore"):
@@ -107,9 +114,18 @@ def _camera_pose(log: Log, k: int) -> Poses | None:
     return se3.compose(T_CB, se3.inverse(T_WB))
 
 
-def _rows(log: Log, pixels: Floats, T_CW: Poses) -> tuple[Floats, Floats]:
+def _view(log: Log, j: int, ids: NDArray[np.int64]) -> _View:
+    T_CW = _camera_pose(log, j)
+    assert T_CW is not None
+    _, at, there = np.intersect1d(ids, log.frames[j].ids.astype(np.int64), return_indices=True)
+    pixels = log.frames[j].pixels.astype(np.float64)[there]
+    good = np.isfinite(pixels).all(axis=1) & (pixels[:, 0] > pixels[:, 2])
+    return _View(at[good], pixels[good], T_CW)
+
+
+def _rows(log: Log, view: _View) -> tuple[Floats, Floats]:
     """(n, 4, 3) and (n, 4): what uL, vL, uR and vR say of the point, linear, in pixels."""
-    camera = log.header.camera
+    camera, pixels, T_CW = log.header.camera, view.pixels, view.T_CW
     z = camera.fx_px * camera.baseline_m / (pixels[:, 0] - pixels[:, 2])
     focal = np.array([camera.fx_px, camera.fy_px, camera.fx_px, camera.fy_px])
     ray = (pixels - [camera.cx_px, camera.cy_px, camera.cx_px, camera.cy_px]) / focal
@@ -119,6 +135,27 @@ def _rows(log: Log, pixels: Floats, T_CW: Poses) -> tuple[Floats, Floats]:
     A: Floats = (T_CW.R[first] - ray[:, :, None] * T_CW.R[2]) * weight[:, :, None]
     y: Floats = (ray * T_CW.p[2] - T_CW.p[first] + shift) * weight
     return A, y
+
+
+def _about(log: Log, view: _View, p_W: Floats) -> tuple[Floats, Floats]:
+    """(n, 4, 3) and (n, 4): derivatives of the pixels by the point, and seen minus expected; zero
+    where it lies behind the camera.
+    """
+    camera = log.header.camera
+    x, y, z = se3.apply(view.T_CW, p_W).T
+    good = z > NEAR_M
+    z = np.where(good, z, 1.0)
+    fx, fy, zero = camera.fx_px / z, camera.fy_px / z, np.zeros_like(z)
+    rows = [
+        (fx, zero, -fx * x / z),
+        (zero, fy, -fy * y / z),
+        (fx, zero, -fx * (x - camera.baseline_m) / z),
+        (zero, fy, -fy * y / z),
+    ]
+    J = np.stack([np.stack(row, axis=-1) for row in rows], axis=1) @ view.T_CW.R
+    off = view.pixels - _projected(log, p_W, view.T_CW)
+    keep = good & (np.abs(np.nan_to_num(off, nan=np.inf)) <= FAR_PX).all(axis=1)
+    return J * keep[:, None, None], np.where(keep[:, None], off, 0.0)
 
 
 def _projected(log: Log, p_W: Floats, T_CW: Poses) -> Floats:
