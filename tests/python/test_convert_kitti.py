@@ -13,8 +13,9 @@ import pytest
 from converted import Run, messages_of
 from numpy.typing import NDArray
 from pelorus import se3
-from pelorus.frames import Header, Stereo, Truth, Twist, TwistTiming
+from pelorus.frames import Config, Header, Stereo, Truth, Twist, TwistTiming
 from pelorus.se3 import Poses
+from pelorus.settings import IDS
 from pelorus.tracks import triangulate
 from rendered import FRAMES, HEIGHT, RATE_HZ, SPEED_MPS, WIDTH, Scene, write_picture
 from rigs import Cameras
@@ -149,6 +150,8 @@ def test_a_raw_drive_arrives_with_its_oxts_as_twists_and_truth(
     assert np.allclose(header.R_CB, T_CB.R)
     assert np.allclose(header.t_CB_m, T_CB.p)
     assert header.twist_timing is TwistTiming.END
+    (wanted,) = messages_of(target, Config)  # what is known of the truth's attitude
+    assert wanted.settings == {IDS["start-sigma"]: 0.01}
     assert (header.image_width_px, header.image_height_px) == (WIDTH, HEIGHT)
     twists = messages_of(target, Twist)
     assert np.allclose([m.v_B_mps for m in twists], velocity_B())

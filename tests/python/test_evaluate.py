@@ -112,6 +112,16 @@ def test_a_scale_is_not_fitted() -> None:
     assert evaluation.path_m(estimate) == pytest.approx(1.01 * (COUNT - 1))
 
 
+def test_a_way_of_another_scale_is_fitted_with_it() -> None:
+    chance = np.random.default_rng(8)
+    source = chance.normal(size=(50, 3))
+    A = se3.exp([3.0, -2.0, 1.0], [0.3, -1.0, 2.0])
+    fit, scale = evaluation.similarity_fit(source, 1.7 * source @ A.R.T + A.p)
+    assert scale == pytest.approx(1.7)
+    assert np.allclose(fit.R, A.R)
+    assert np.allclose(fit.p, A.p)
+
+
 def test_the_rigid_fit_is_the_least_squares_one_and_never_a_mirror() -> None:
     source = CHANCE.normal(size=(50, 3)) * [10, 5, 0.01]
     by = se3.exp(np.array([1.0, 2, 3]), np.array([0.5, 1.0, -0.7]))

@@ -13,6 +13,7 @@ from pelorus.converters import landmark_map
 from pelorus.evaluation import made_in
 from pelorus.frame_table import HEALTH
 from pelorus.frames import Landmark, Report, Role
+from pelorus.trajectory import read_stamped
 from replay_drive import BIN, FRAMES, drive, log_of, points, poses_of, recorder, run
 
 
@@ -100,3 +101,14 @@ def test_what_cannot_be_written_is_told_and_leaves_nothing(
     said = pelorus("export", log, "--map", tmp_path / "map.ply", "--set", "slots=3", status=1)
     assert "result already" in said.err
     assert {path.name for path in tmp_path.iterdir()} == {"drive.plr", "log.plr"}
+
+
+def test_the_trajectory_is_a_tum_file_that_is_read_back(
+    pelorus: Run, log: Path, tmp_path: Path
+) -> None:
+    tum = tmp_path / "way.tum"
+    pelorus("export", log, "--tum", tum)
+    way, poses = read_stamped(tum), poses_of(log)
+    assert way.t_ns.tolist() == [pose.t_ns for pose in poses]
+    assert np.allclose(way.poses.p, [pose.p_WB_m for pose in poses], rtol=1e-8, atol=1e-12)
+    assert np.allclose(way.poses.R, [pose.R_WB for pose in poses], atol=1e-8)

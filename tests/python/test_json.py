@@ -32,7 +32,8 @@ def test_a_report_has_the_figures_of_each_run(
     found = json.loads(pelorus(*words, "--json").out)
     assert Path(found["report"]).is_file()
     told = pelorus(*words, "--force").out
-    assert all(f"- {line}\n" in told for line in found["verdicts"])
+    assert all(f"- {line}\n" in told for line in found["remarks"])
+    assert told.startswith(f"{found['verdict']}\n")
     assert f"health: {found['health'][0]}\n" in told
     assert list(found["runs"]) == ["yours", "dead-reckoning"]
     assert found["runs"]["yours"]["frames"] == FRAMES

@@ -15,7 +15,7 @@ from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "TEN-MINUTES.md").read_text()
-SET_UP = "tools/demo.sh", "export PATH="  # the tests' own environment stands for them
+SET_UP = ("pip install",)  # the tests' own environment stands for them
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -46,7 +46,7 @@ def is_said(line: str, output: str) -> bool:
 
 
 def folder_of_the_project(folder: Path) -> None:
-    """What a fresh clone has after tools/demo.sh."""
+    """What a fresh clone has after pip install, and the programs of the tests."""
     (folder / "tools").symlink_to(ROOT / "tools")
     (folder / "build").mkdir()
     (folder / "build" / "bin").symlink_to(BIN.resolve())

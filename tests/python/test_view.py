@@ -97,6 +97,19 @@ def read_mcap(path: Path) -> dict[str, list[tuple[int, Any]]]:
     return found
 
 
+def test_a_layout_shows_what_the_file_holds(log: Path, tmp_path: Path, pelorus: Command) -> None:
+    mcap, layout = tmp_path / "log.mcap", tmp_path / "layout.json"
+    pelorus("view", log, "--mcap", mcap, "--layout", layout)
+    held = read_mcap(mcap)
+    panels = json.loads(layout.read_text())["configById"]
+    topics = {topic for panel in panels.values() for topic in panel.get("topics", {})}
+    assert topics - {"/pelorus/truth"} <= set(held)
+    paths = [path["value"] for panel in panels.values() for path in panel.get("paths", ())]
+    assert len(paths) > 6
+    for topic, _, name in (value.removesuffix('"').partition('."') for value in paths):
+        assert name in held[topic][-1][1], topic
+
+
 def test_mcap_holds_the_log_with_foxglove_s_schemas(
     pelorus: Command, log: Path, tmp_path: Path
 ) -> None:

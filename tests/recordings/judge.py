@@ -114,7 +114,12 @@ def by_real_imu() -> Iterator[Case]:
         ("euroc V102", "imu/euroc-V102-real-imu.npz", ("imu-npz",), "ATE"),
         ("euroc V203", "imu/euroc-V203-real-imu.npz", ("imu-npz",), "ATE"),
         ("euroc MH01 tracks", "imu/euroc-mh01-tracks.plr", (), "err0"),
-        ("euroc MH01 pictures", START, ("euroc", "--truth", str(DATA / START / "truth.tum")), "err0"),
+        (
+            "euroc MH01 pictures",
+            START,
+            ("euroc", "--truth", str(DATA / START / "truth.tum")),
+            "err0",
+        ),
     ):
         yield Case(f"{name}, default", file, convert, (), figure)
         yield Case(name, file, convert, conf("imu-adis16448"), figure)

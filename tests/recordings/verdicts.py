@@ -149,7 +149,7 @@ def verdict_of(name: str, path: Path, program: Path) -> tuple[bool, bool]:
     right = ate == "-" or float(ate) <= max(RIGHT_SHARE * way, RIGHT_M)
     bad = found.grade is Grade.BAD
     print(f"{name}: {found.verdict}; ATE {ate} m of {way:.1f} m", flush=True)
-    for remark in found.remarks:
+    for remark in found.verdict.remarks:
         if bad and remark.grade is Grade.BAD:
             print(f"    {remark.text}", flush=True)
     return right, bad

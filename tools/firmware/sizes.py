@@ -353,6 +353,13 @@ without interrupts and session.
 
 {memory}
 
+The filter alone, all of it at -Os for a Cortex-M7 (N = 32, every room, before the linker leaves out
+what nobody calls), is 144274 bytes; the command in a folder of its own:
+
+    arm-none-eabi-gcc -Os -mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16 -std=c99 \\
+        -ffp-contract=off -fno-math-errno -I$ROOT/include -I$ROOT/src -c $ROOT/src/*/*.c
+    arm-none-eabi-size -t *.o
+
 There is no heap and no stdio: the linker refuses `malloc`, `printf` and their like, and the library
 has no writable globals (`tests/layering`).
 

@@ -9,14 +9,20 @@ from __future__ import annotations
 
 import json
 import math
+import time
 import unicodedata
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import track
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from pelorus.check.verdict import Verdict
 
 Item = TypeVar("Item")
 
@@ -75,16 +81,83 @@ def leave_standard_output() -> None:
     out.stderr = True
 
 
+SAID_EVERY_S = 10.0  # where there is no terminal
+
+
+@dataclass
+class _Told:
+    """How far the command is, and when that was last said."""
+
+    steps: int = 0
+    step: int = 0
+    words: str = ""
+    clock: Callable[[], float] = time.monotonic
+    said_s: float = field(default_factory=time.monotonic)
+
+    def label(self, what: str) -> str:
+        return f"step {self.step} of {self.steps}, {self.words}: {what}" if self.steps else what
+
+    def say(self, words: str) -> None:
+        """A line, if none was printed for long."""
+        if err.is_terminal or self.clock() - self.said_s < SAID_EVERY_S:
+            return
+        self.said_s = self.clock()
+        err.print(words, markup=False)
+
+
+told = _Told()
+
+
+@contextmanager
+def steps(count: int) -> Iterator[None]:
+    """A whole command, of so many steps; where one command runs another the outer one counts."""
+    if told.steps:
+        yield
+        return
+    told.steps, told.step = count, 0
+    try:
+        yield
+    finally:
+        told.steps = 0
+
+
+def step(words: str) -> None:
+    """The next one begins."""
+    told.step, told.words = min(told.step + 1, told.steps), words
+
+
 def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterator[Item]:
-    """A bar on a terminal, nothing elsewhere."""
-    yield from track(items, what, total, console=err, transient=True, disable=not err.is_terminal)
+    """A bar on a terminal, a line every ten seconds elsewhere."""
+    label = told.label(what)
+    if err.is_terminal:
+        yield from track(items, label, total, console=err, transient=True)
+        return
+    of = total if total is not None else len(items) if isinstance(items, Sized) else None
+    for done, item in enumerate(items):
+        if done:
+            told.say(f"{label}, {done}{f' of {of}' if of else ''}")
+        yield item
+
+
+VERDICT_COLOURS = {"good": "green", "care": "yellow", "bad": "red"}
+
+
+def tell_verdict(verdict: Verdict) -> None:
+    """In its colour, with the reasons and what to set: the first lines of every command that has
+    one.
+    """
+    head, *why = verdict.lines()
+    out.print(f"[bold {VERDICT_COLOURS[verdict.mark]}]{escape(head)}[/]")
+    for words in why:
+        out.print(escape(words))
 
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
     """For one piece of work that cannot say how far it is: a sign of life on a terminal."""
+    told.say(told.label(what))
     if not err.is_terminal:
         yield
         return
-    with err.status(what):
+    with err.status(told.label(what)):
         yield

@@ -41,6 +41,8 @@ from pelorus.trajectory import Trajectory, estimate_in, filled, truth_in
 MEANING = {
     "err0_m": "RMS position error, first poses aligned",
     "ate_m": "RMS position error after the best rigid fit",
+    "ate_sim3_m": "RMS position error after the best fit of place, turn and scale",
+    "scale": "by which the estimate is to be multiplied for that",
     "rot_deg": "RMS rotation error, first poses aligned",
     "nees_per_dof": "mean NEES of the pose, a degree of freedom: 1 is due",
     **inertial_evaluation.MEANING,
@@ -89,6 +91,13 @@ class Accuracy:
     def ate_m(self) -> float:
         fit = rigid_fit(self.truth.p, self.estimate.p)
         return rms(self.estimate.p - se3.apply(fit, self.truth.p))
+
+    @property
+    def sim3(self) -> Figures:
+        """ATE with the best scale of the estimate, and that scale: as of one camera's way."""
+        fit, scale = similarity_fit(self.estimate.p, self.truth.p)
+        off = self.truth.p - scale * self.estimate.p @ fit.R.T - fit.p
+        return {"ate_sim3_m": rms(off), "scale": scale}
 
     @property
     def nees_per_dof(self) -> float | None:
@@ -193,6 +202,27 @@ def rigid_fit(source: Floats, target: Floats) -> Poses:
     middle_source, middle_target = source.mean(axis=0), target.mean(axis=0)
     R = se3.nearest_rotation((target - middle_target).T @ (source - middle_source))
     return Poses(R, middle_target - R @ middle_source)
+
+
+def similarity_fit(source: Floats, target: Floats) -> tuple[Poses, float]:
+    """The rigid motion and the scale with the least squared distance of s source to target: as
+    `rigid_fit`, Umeyama's equation 42.
+    """
+    fit = rigid_fit(source, target)
+    a, b = source - source.mean(axis=0), target - target.mean(axis=0)
+    spread = float(np.sum(a * a))
+    scale = float(np.sum((a @ fit.R.T) * b)) / spread if spread > 0 else 1.0
+    return Poses(fit.R, target.mean(axis=0) - scale * fit.R @ source.mean(axis=0)), scale
+
+
+def beside(other: Trajectory, own: Trajectory, tolerance_ns: int) -> Trajectory | None:
+    """Another program's way, from its world brought to this one where both first have a pose."""
+    mine, theirs = match(own, other, tolerance_ns)
+    if not len(mine):
+        return None
+    A = _onto(own.poses.at(int(mine[0])), other.poses.at(int(theirs[0])))
+    kept = se3.compose(A, other.poses.at(theirs))
+    return Trajectory(own.t_ns[mine], kept)
 
 
 def step_change(poses: Poses) -> float:

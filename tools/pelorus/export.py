@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A filter's landmarks as tables for other programs: CSV with covariance, PLY to look at."""
+"""What a filter found as files for other programs: landmarks as CSV or PLY, the way as TUM."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pelorus.converters.landmark_map import COVARIANCE, POSITION, WORLD
 from pelorus.errors import PelorusError, write_text
 from pelorus.evaluation import sigmas_m
-from pelorus.frames import Landmark
+from pelorus.frames import Landmark, Message
+from pelorus.trajectory import estimate_in
 
 PLY_HEAD = """ply
 format ascii 1.0
@@ -35,6 +37,22 @@ def write_map(path: Path, landmarks: Sequence[Landmark]) -> None:
         raise PelorusError(f"{path}: is neither .csv nor .ply")
     text = _csv(landmarks) if path.suffix == ".csv" else _ply(landmarks)
     write_text(path, text)
+
+
+def write_tum(path: Path, messages: Sequence[Message]) -> None:
+    """The body's poses after each frame, in the form that `evaluate` and evo read; times to the
+    nanosecond.
+    """
+    found = estimate_in(messages)
+    if found is None:
+        raise PelorusError("there is no pose after a frame to write")
+    t_ns, poses = found[0].t_ns, found[0].poses
+    turns = Rotation.from_matrix(poses.R).as_quat(canonical=True)
+    rows = [
+        f"{t // 10**9}.{t % 10**9:09d} {_numbers(p, ' ')} {_numbers(q, ' ')}\n"
+        for t, p, q in zip(t_ns.tolist(), poses.p, turns, strict=True)
+    ]
+    write_text(path, "# t x y z qx qy qz qw\n" + "".join(rows))
 
 
 def _csv(landmarks: Sequence[Landmark]) -> str:

@@ -58,7 +58,7 @@ HARMLESS = schema.LIMITS["harmless_reasons"]  # they leave the estimate as good 
 @dataclass(frozen=True)
 class Spell:
     """From the first frame that is not good to the last; `why`: causes before symptoms, of each the
-    most frequent first.
+    most frequent first; `counts`: in how many of the frames each of them held.
     """
 
     health: int
@@ -66,13 +66,21 @@ class Spell:
     to_ns: int
     frames: int
     why: tuple[str, ...]
+    counts: tuple[int, ...] = ()
 
     def words(self, origin_ns: int) -> str:
         """`lost from 37.0 to 40.1 s (31 frames): identical pixels`."""
         start, end = (f"{(t - origin_ns) * 1e-9:.1f}" for t in (self.from_ns, self.to_ns))
         when = f"at {start} s" if start == end else f"from {start} to {end} s"
         frames = f" ({self.frames} frame{'s' if self.frames > 1 else ''})" if self.frames else ""
-        return f"{schema.HEALTHS[self.health]} {when}{frames}: {', '.join(self.why)}"
+        return f"{schema.HEALTHS[self.health]} {when}{frames}: {self.reasons}"
+
+    @property
+    def reasons(self) -> str:
+        """`identical pixels, no point used for long (2 of them)`."""
+        counts = self.counts or (self.frames,) * len(self.why)
+        some = (f" ({count} of them)" if count < self.frames else "" for count in counts)
+        return ", ".join(map("".join, zip(self.why, some, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -142,19 +150,20 @@ def _of_frames(answers: Sequence[Report]) -> Iterator[Spell]:
         open_: Spell | None = None
         for answer in (answer for answer in answers if answer.health == health):
             if open_ is not None and answer.t_ns - open_.to_ns > PAUSE_NS:
-                yield replace(open_, why=_ordered(why))
+                yield _closed(open_, why)
                 open_, why = None, Counter()
             why.update(_why(answer))
             first = answer.t_ns if open_ is None else open_.from_ns
             frames = 1 if open_ is None else open_.frames + 1
             open_ = Spell(health, first, max(answer.t_ns, first), frames, ())
         if open_ is not None:
-            yield replace(open_, why=_ordered(why))
+            yield _closed(open_, why)
 
 
-def _ordered(why: Counter[str]) -> tuple[str, ...]:
-    words = [words for words, _ in why.most_common()] or ["no reason given"]
-    return tuple(sorted(words, key=lambda word: word in SYMPTOMS))
+def _closed(spell: Spell, why: Counter[str]) -> Spell:
+    told = why.most_common() or [("no reason given", spell.frames)]
+    told.sort(key=lambda reason: reason[0] in SYMPTOMS)
+    return replace(spell, why=tuple(words for words, _ in told), counts=tuple(n for _, n in told))
 
 
 def _pauses(answers: Sequence[Report]) -> Iterator[Spell]:

@@ -77,7 +77,7 @@ def _head(name: str, about: str) -> str:
 
 
 def _paragraphs(command: Any) -> list[str]:
-    return inspect.cleandoc(command.help or "").split("\n\n")
+    return inspect.cleandoc(command.help or "").replace("\\[", "[").split("\n\n")
 
 
 def _list(title: str, records: list[tuple[str, str]]) -> str:

@@ -3,17 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import hypot
 
 from pelorus.check.mount import Turned, turned
 from pelorus.check.scale import Doubt, bias_of, doubted
-from pelorus.faults.agreement import NO_BIAS_MPS, Agreement, agreement
-from pelorus.faults.handeye import first_part
-from pelorus.faults.two_views import TwoViews
+from pelorus.faults.agreement import NO_BIAS_MPS, Agreement
 from pelorus.frames import Message
-from pelorus.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -40,19 +37,10 @@ class Calibration:
 
 
 def calibration(
-    recording: Recording, views: TwoViews | None, messages: Sequence[Message]
+    agreed: Callable[[float], Agreement | None], messages: Sequence[Message]
 ) -> Calibration:
-    """Of a run by twists; `views` of neighbouring frames of the recording's first part."""
-    found = None if views is None else _agreed(recording, views, messages)
-    if found is None:
+    """Of a run by twists; `agreed` is what the recording tells beside a bias of so many m/s."""
+    found = agreed(max(bias_of(messages), NO_BIAS_MPS))
+    if found is None or not found.told:
         return Calibration()
     return Calibration(doubted(found, messages), turned(found, messages))
-
-
-def _agreed(recording: Recording, views: TwoViews, messages: Sequence[Message]) -> Agreement | None:
-    """With the run's biases."""
-    short = first_part(recording)
-    bias = max(bias_of(messages), NO_BIAS_MPS)
-    noise = replace(short.header.noise, bias_velocity_sigma_mps=bias)
-    found = agreement(short.with_header(noise=noise), views)
-    return found if found.told else None

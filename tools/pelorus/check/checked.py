@@ -7,111 +7,130 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pelorus import wire
-from pelorus.check import verdict, wheels
+from pelorus.check import changes, wheels
 from pelorus.check.calibration import calibration
-from pelorus.check.estimated import estimated, without_clock
+from pelorus.check.estimated import without_clock
 from pelorus.check.halves_alike import with_halves_alike
 from pelorus.check.held import held_against
+from pelorus.check.known import Known
 from pelorus.check.options import Settings, options_of
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
-from pelorus.check.verdict import Grade, Remark, Run
-from pelorus.console import progress
+from pelorus.check.verdict import Grade, Remark, Run, Verdict, of_search, verdict_of
+from pelorus.console import progress, step
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
-from pelorus.faults.mend import BEHIND, CANNOT, known_words
 from pelorus.faults.named import judged_of
 from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
 
 SPELLS_SHOWN = 12
+STEPS = 5
 NAMED = "a fault is named first"
 NOTHING_USED = "no frame could be used"  # words of pelorus-replay
 
 
 @dataclass(frozen=True)
 class Checked:
-    """`rows`: title, before, after."""
+    """`verdict` with the settings that are written, `as_given` with those that were given; `notes`
+    of the search. `rows`: title, before, after.
+    """
 
-    grade: Grade
-    remarks: list[Remark]
+    verdict: Verdict
+    as_given: Verdict | None  # None: nothing was used with them, or a fault stands in the way
+    notes: list[Remark]
     spells: list[str]
     changes: list[str]
     rows: list[tuple[str, str, str]]
     tuned: Tuned | None  # None where a fault must be mended first
-    share: float = 0.0  # of the way, by which positions may be off, if more than was given
     lines: tuple[str, ...] = ()  # of a config: what should be set otherwise
+
+    @property
+    def remarks(self) -> list[Remark]:
+        """Of the run, and of the search."""
+        return [*self.verdict.remarks, *self.notes]
+
+    @property
+    def grade(self) -> Grade:
+        """Of the verdict."""
+        return self.verdict.grade
+
+    @property
+    def was(self) -> str:
+        """The verdict with the settings that were given, where it is another one."""
+        if self.tuned is None:
+            return ""
+        if self.as_given is None:
+            return "with the settings as they are no frame can be used"
+        if self.as_given.grade == self.verdict.grade:
+            return ""
+        return f"with the settings as they are: {self.as_given.words}"
 
     def next_step(self, tuned: Path) -> str:
         """What to do now."""
         if self.tuned is None:
-            worst = max(self.remarks, key=lambda remark: remark.grade)
-            return f"mend this first, and convert again: {worst.text.partition(':')[0]}"
+            return f"mend this first, and convert again: {self.verdict.doubts[0].partition(':')[0]}"
         if not self.lines:
             return "nothing need be changed"
         return f"run with --config {tuned}, or set {'; '.join(self.lines)}"
 
-    @property
-    def verdict(self) -> str:
-        """No better than what the drive can tell."""
-        words = verdict.VERDICTS[self.grade]
-        told = self.share > 0 and self.grade is not Grade.BAD
-        return f"{words}, to {self.share:.1%} of the way" if told else words
-
 
 def check(program: Path, recording: Path, given: Settings, folder: Path) -> Checked:
     """Tune in the folder, then replay the whole recording with both settings."""
+    step("faults of the recording")
     bench = Bench(program, recording, folder, given.get("process", ""))
     messages = wire.messages_of(recording)
-    judged = judged_of(messages, bench.examined)
-    named = judged.faults
-    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.told) for f in named]
-    if any(fault.stops for fault in named):
-        known = BEHIND if judged.agreed is None else f"{known_words(judged.agreed)}; {CANNOT}"
-        faults.append(Remark(Grade.CARE, known))
-        return Checked(Grade.BAD, faults, [], [], [], None)
-    one_clock = all(fault.name != "clock-turns" for fault in named)
+    known = Known(judged_of(messages, bench.examined), None, bench.examined)
+    if known.is_stopped:
+        return Checked(verdict_of(None, known), None, [], [], [], [], None)
+    step("noises, clock and biases")
+    one_clock = all(fault.name != "clock-turns" for fault in known.faults)
     found = tune(bench, without_clock(given), one_clock)
     if "calibrate" in given:
         found = replace(found, settings=found.settings | {"calibrate": given["calibrate"]})
-    if any(fault.lasts for fault in named):
+    if any(fault.lasts for fault in known.faults):
         found.lasting.append(NAMED)
+    known = replace(known, noise=found.noise)
+    step("held against yours")
     tuned = held_against(bench, given, found)
+    step("errors that points share")
     tuned = with_halves_alike(bench, with_shared_rows(bench, tuned))
     truth = truth_in(messages)
+    step("the verdict")
     both = progress((("before", given), ("after", tuned.settings)), "whole drive")
     before, run = (_whole(program, recording, settings, folder, name) for name, settings in both)
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
-    views = None if bench.by_imu else judged.views
-    camera = calibration(bench.examined, views, run.messages)
-    if camera.settings:  # no estimate changes by it, and each covariance
-        tuned = replace(tuned, settings=tuned.settings | camera.settings)
+    camera = calibration(known.agreed, run.messages).settings
+    if camera:  # no estimate changes by it, and each covariance
+        tuned = replace(tuned, settings=tuned.settings | camera)
         run = _whole(program, recording, tuned.settings, folder, "after") or run
-    origin = int(run.frames.t_ns[0])
-    own = estimated(run.messages, camera)
-    remarks = [*faults, *verdict.remarks(run, tuned, origin), *verdict.of_calibration(camera, own)]
     rows = [(title, figures.get(title, "-"), now) for title, now in _figures(run, truth).items()]
     cost = (
         "-2 ln likelihood an observation",
         f"{tuned.before.cost:.2f}",
         f"{tuned.after.cost:.2f}",
     )
-    spells = [spell.words(origin) for spell in run.health.spells]
+    spells = [spell.words(run.origin_ns) for spell in run.health.spells]
     if len(spells) > SPELLS_SHOWN:
         spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
-    changed = verdict.changes(given, bench.header, tuned, bench.by_imu)
-    if judged.agreed is not None:
-        words = f"{known_words(judged.agreed)}; {CANNOT}"
-        remarks.append(Remark(Grade.GOOD, words))
+    notes = of_search(tuned)
     if bench.by_imu:
-        remarks += wheels.remarks(program, messages, tuned.settings)
-    grade = verdict.overall(remarks)
-    lines = tuple(verdict.lines(given, bench.header, tuned, bench.by_imu))
-    return Checked(grade, remarks, spells, changed, [cost, *rows], tuned, camera.share, lines)
+        notes += wheels.remarks(program, messages, tuned.settings)
+    changed = given, bench.header, tuned, bench.by_imu
+    return Checked(
+        verdict_of(run, known),
+        None if before is None else verdict_of(before, known),
+        notes,
+        spells,
+        changes.changes(*changed),
+        [cost, *rows],
+        tuned,
+        tuple(changes.lines(*changed)),
+    )
 
 
 def _whole(
@@ -146,8 +165,8 @@ def _figures(run: Run, truth: Trajectory | None) -> dict[str, str]:
 def config_text(found: Checked, recording: Path) -> str:
     """A settings file, with what was found as its remarks."""
     assert found.tuned is not None
-    lines = [f"# pelorus check {recording.name}: {found.verdict}"]
-    lines += [f"#   {remark.text}" for remark in found.remarks if remark.grade > Grade.GOOD]
+    lines = [f"# pelorus check {recording.name}: {found.verdict.words}"]
+    lines += [f"#   {words}" for words in found.verdict.doubts]
     lines += [f"# {change}" for change in found.changes]
     lines += [f"{name} = {value}" for name, value in found.tuned.settings.items()]
     return "\n".join(lines) + "\n"

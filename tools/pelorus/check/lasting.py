@@ -8,10 +8,20 @@ from collections.abc import Callable, Sequence
 from pelorus.consistency import mean, nees_per_dof
 from pelorus.frames import Message
 from pelorus.layout import Floats
+from pelorus.schema import DEFAULTS
 from pelorus.se3 import Poses
 from pelorus.trajectory import estimate_in
 
+LARGEST = 0.1  # that baseline-sigma takes
 ADDS = 0.5  # to a NEES of 1, a degree of freedom: less does not matter
+
+
+ROUNDED = 0.9  # a setting of two digits stands for as much
+
+
+def stands(given: float, amount: float, setting: str) -> bool:
+    """Whether a setting, that is not the default, is there for so much."""
+    return given > DEFAULTS[setting] and given >= ROUNDED * min(amount, LARGEST)
 
 
 def added_nees(messages: Sequence[Message], off_by: Callable[[Poses], Floats]) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pelorus.check.lasting import ADDS, added_nees
+from pelorus.check.lasting import ADDS, added_nees, stands
 from pelorus.faults.agreement import Agreement
 from pelorus.frames import Message
 from pelorus.layout import Floats
@@ -46,7 +46,9 @@ class Turned:
     def is_off(self) -> bool:
         """Surely, and by more than the filter says of its positions."""
         d2 = self.turn_rad @ np.linalg.solve(self.covariance, self.turn_rad)
-        return bool(d2 > SURE**2) and self.adds > ADDS
+        each = float(np.linalg.norm(self.turn_rad) / np.sqrt(3.0))
+        matters = self.adds > ADDS or stands(self.given, each, CAMERA_TURN)
+        return bool(d2 > SURE**2) and matters
 
     @property
     def beyond(self) -> float:
@@ -57,7 +59,7 @@ class Turned:
     def setting(self) -> dict[str, str]:
         """By which the covariances contain it, where they do not."""
         each = float(np.linalg.norm(self.turn_rad) / np.sqrt(3.0))
-        if not self.is_off or each <= self.given:
+        if not self.is_off or each <= self.given or stands(self.given, each, CAMERA_TURN):
             return {}
         return {CAMERA_TURN: f"{min(each, TURN_MOST):.2g}"}
 

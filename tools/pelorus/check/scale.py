@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pelorus.check import clock
-from pelorus.check.lasting import ADDS, added_nees
+from pelorus.check.lasting import ADDS, added_nees, stands
 from pelorus.check.options import Settings
 from pelorus.check.outcome import SCALE, Bench
 from pelorus.check.parameters import PAYS
@@ -81,13 +81,16 @@ class Doubt:
 
     @property
     def beyond(self) -> float:
-        """The same where it is more than what the filter says of its positions, else 0."""
-        return self.share if self.adds > ADDS and not self.is_untold else 0.0
+        """The same where it is more than what the filter says of its positions, or than it would
+        say without a baseline-sigma that was set for it, else 0.
+        """
+        matters = self.adds > ADDS or stands(self.given, self.share, "baseline-sigma")
+        return self.share if matters and not self.is_untold else 0.0
 
     @property
     def setting(self) -> dict[str, str]:
         """By which the covariances contain it, where they do not."""
-        if self.beyond <= self.given:
+        if self.beyond <= self.given or stands(self.given, self.share, "baseline-sigma"):
             return {}
         return {"baseline-sigma": f"{min(self.share, BASELINE_MOST):.2g}"}
 

@@ -1,41 +1,56 @@
 # SPDX-License-Identifier: MIT
-"""What a run says about itself, without truth: can it be trusted, and what is wrong?"""
+"""Can a run be trusted, why, and what should be set otherwise? The one place where that is said:
+`check`, `try`, `report` and `explain` show what comes from here.
+
+It is made of what the recording tells by itself (known.py), of what the filter said of itself in
+this run, and of the recording's truth where it has one. The same run has the same verdict, whoever
+asks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
 
 from pelorus.arrivals import late_ones
-from pelorus.check.calibration import Calibration
-from pelorus.check.estimated import Estimated
+from pelorus.check.calibration import Calibration, calibration
+from pelorus.check.estimated import Estimated, estimated
+from pelorus.check.known import Known, known_of
 from pelorus.check.mount import CAMERA_TURN, Turned
-from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
+from pelorus.check.parameters import FRAMES_FEW, Tuned
 from pelorus.check.scale import Doubt
-from pelorus.check.tracks_noise import DRIFT
+from pelorus.check.tracks_noise import DRIFT, told_apart
+from pelorus.evaluation import judge
+from pelorus.faults.mend import BEHIND, CANNOT, known_words
 from pelorus.frame_table import BIASES, FrameTable, frame_table
-from pelorus.frames import Header, Kind, Message, Report
+from pelorus.frames import Kind, Message, Report
 from pelorus.health import GOOD as OF_GOOD
 from pelorus.health import HARMLESS, LOST, NOT_STARTED, TimeLine, time_line
 from pelorus.schema import HEALTHS, number
-from pelorus.settings import in_force
+from pelorus.settings import IDS, SETTINGS, in_force
+from pelorus.trajectory import truth_in
 
 GOOD = HEALTHS[0]
 LATE = number("status", "LATE")
 # reasons that have a remark of their own
 TOLD_APART = number("reason", "NO_TWISTS") | number("reason", "BIAS_OFF_PRIOR")
+NOT_POSITIVE = number("reason", "NOT_POSITIVE")
 GOOD_MOST, DOUBTED_HALF, LOST_MANY = 0.95, 0.5, 0.1  # of the frames
-GATED_MANY, GATED_MOST = 0.1, 0.3  # of the matches
+GATED_USUAL = 0.01  # of right matches, by the gate's own level
+GATED_MANY, GATED_MOST = 0.05, 0.3  # of the matches
 WINDOW_S = 5.0
 WORSE = 3.0  # times the usual share of a window that is worth naming
 NIS_LOW, NIS_HIGH = 0.6, 1.6
+NEES_HIGH, NEES_BAD = 2.0, 9.0  # a degree of freedom: errors three times as large as it says
+TRUTH_FEW = 20  # frames: the NEES of fewer says nothing
 BIAS_SIGMAS, BIAS_SIGMAS_BAD = 3.0, 10.0
-OTHER_SIGMA = 1.2  # a setting that differs by more is told
 FEW_USED = 8.0  # a frame
 SHARE_MANY = 0.01  # of the way, that a bias may hide
+PIXEL = "pixel-sigma"
+REASONS_TOLD = 3  # on a terminal
 
 
 class Grade(IntEnum):
@@ -51,14 +66,83 @@ VERDICTS = {
     Grade.CARE: "this can be trusted with care",
     Grade.BAD: "do not trust this",
 }
+MARKS = ("good", "care", "bad")
+NOTE = "note"
+NOISES = "`pelorus check` on the recording writes noises that fit"
 
 
 @dataclass(frozen=True)
 class Remark:
-    """One thing that was looked at."""
+    """One thing that was looked at. A note tells of the search for settings, not of the run: it
+    decides nothing.
+    """
 
     grade: Grade
     text: str
+    is_note: bool = False
+
+    @property
+    def mark(self) -> str:
+        return NOTE if self.is_note else MARKS[self.grade]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """`share`: of the way, by which positions may be off, if more than the settings say. `settings`
+    that the recording itself asks for; `noises` are beside what was seen, which `check` can mend.
+    """
+
+    grade: Grade
+    remarks: tuple[Remark, ...] = ()
+    share: float = 0.0
+    settings: Mapping[str, str] = field(default_factory=dict)
+    noises: bool = False
+    is_stopped: bool = False  # by a fault that must be mended first
+
+    def __str__(self) -> str:
+        return self.words
+
+    @property
+    def words(self) -> str:
+        """No better than what the drive can tell."""
+        told = self.share > 0 and self.grade is not Grade.BAD
+        words = VERDICTS[self.grade]
+        return f"{words}, to {self.share:.1%} of the way" if told else words
+
+    @property
+    def mark(self) -> str:
+        return MARKS[self.grade]
+
+    @property
+    def doubts(self) -> list[str]:
+        """Why it is not better, the worst first."""
+        odd = [remark for remark in self.remarks if remark.grade and not remark.is_note]
+        return [remark.text for remark in sorted(odd, key=lambda remark: -remark.grade)]
+
+    @property
+    def to_set(self) -> list[str]:
+        """What to set, in words."""
+        lines = [f"{name} = {value}" for name, value in self.settings.items()]
+        said = [f"set {'; '.join(lines)}"] if lines else []
+        if self.noises and not self.is_stopped:
+            said.append(NOISES)
+        return said
+
+    def json(self) -> dict[str, object]:
+        """The same names in every command."""
+        return {
+            "verdict": self.words,
+            "grade": self.mark,
+            "why": self.doubts,
+            "what_to_set": dict(self.settings),
+        }
+
+    def lines(self) -> list[str]:
+        """For a terminal."""
+        doubts = self.doubts
+        hidden = [f"and {len(doubts) - REASONS_TOLD} more"] * (len(doubts) > REASONS_TOLD)
+        why = [f"   {words}" for words in (*doubts[:REASONS_TOLD], *hidden)]
+        return [self.words, *why, *(f"   what to do: {words}" for words in self.to_set)]
 
 
 @dataclass(frozen=True)
@@ -72,6 +156,10 @@ class Run:
     @classmethod
     def of(cls, messages: Sequence[Message]) -> Run:
         return cls(messages, frame_table(messages), time_line(messages) or TimeLine(0, {}, ()))
+
+    @property
+    def origin_ns(self) -> int:
+        return int(self.frames.t_ns[0])
 
     @property
     def good_share(self) -> float:
@@ -100,31 +188,56 @@ class Run:
 
     @property
     def nis(self) -> float:
-        """Of all innovations of a frame together, a degree of freedom: 1 is due."""
+        """Of all innovations of a frame together, a degree of freedom: 1 is expected."""
         rows = self.frames["innovation_rows"].sum()
         return float(self.frames["innovation_d2"].sum() / rows) if rows else float("nan")
 
 
-def remarks(run: Run, tuned: Tuned, origin_ns: int) -> list[Remark]:
-    """Of the run with the tuned settings, and of what tuning has found."""
-    return [
-        *of_length(run.health.frames),
-        *_health(run),
-        *_order(run),
-        *_gate(run, origin_ns),
-        *_used(run),
-        *_nis(run, tuned),
-        *_biases(run),
-        *_tracks(tuned),
-        *_halves(tuned),
-        *(Remark(Grade.CARE, words) for words in tuned.doubts),
-        *(Remark(Grade.GOOD, words) for words in tuned.said),
-    ]
+def verdict_of_log(messages: Sequence[Message]) -> Verdict:
+    """Of a filter's result with the recording in it."""
+    return verdict_of(Run.of(messages), known_of(messages))
+
+
+def verdict_of(run: Run | None, known: Known) -> Verdict:
+    """A run is not looked at where a fault of the recording must be mended first."""
+    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.told) for f in known.faults]
+    agreed = known.judged.agreed
+    if known.is_stopped or run is None:
+        told = BEHIND if agreed is None else f"{known_words(agreed)}; {CANNOT}"
+        remarks = (*faults, Remark(Grade.CARE, told))
+        return Verdict(Grade.BAD, remarks, is_stopped=True)
+    camera = calibration(known.agreed, run.messages)
+    settings = {**camera.settings, **_for_tracks(run, known)}
+    own = estimated(run.messages, camera)
+    found = [*faults, *_of_run(run, known), *of_calibration(camera, own)]
+    if agreed is not None:
+        found.append(Remark(Grade.GOOD, f"{known_words(agreed)}; {CANNOT}"))
+    nis_off = not NIS_LOW <= run.nis <= NIS_HIGH and not settings
+    return Verdict(overall(found), tuple(found), camera.share, settings, nis_off)
+
+
+def _of_run(run: Run, known: Known) -> Iterator[Remark]:
+    yield from of_length(run.health.frames)
+    yield from _diverged(run)
+    yield from _health(run)
+    yield from _order(run)
+    yield from _gate(run)
+    yield from _used(run)
+    yield from _nis(run, known)
+    yield from _biases(run)
+    yield from _tracks(run, known)
+    yield from _truth(run)
+
+
+def of_search(tuned: Tuned) -> list[Remark]:
+    """Notes of the search for settings."""
+    said = [*_halves(tuned), *tuned.doubts, *tuned.said]
+    return [Remark(Grade.GOOD, words, is_note=True) for words in said]
 
 
 def overall(found: Sequence[Remark]) -> Grade:
     """As the worst of them."""
-    return max((remark.grade for remark in found), default=Grade.GOOD)
+    return max((remark.grade for remark in found if not remark.is_note), default=Grade.GOOD)
 
 
 def of_length(frames: int) -> Iterator[Remark]:
@@ -162,12 +275,40 @@ def _order(run: Run) -> Iterator[Remark]:
             yield Remark(Grade.BAD, late.words)
 
 
-def _gate(run: Run, origin_ns: int) -> Iterator[Remark]:
+def _diverged(run: Run) -> Iterator[Remark]:
+    """A variance that is not positive is arithmetic that failed: nothing is worse."""
+    frames = run.frames.t_ns[(run.frames.reasons & NOT_POSITIVE) != 0]
+    if len(frames):
+        first_s = (int(frames[0]) - run.origin_ns) * 1e-9
+        yield Remark(
+            Grade.BAD,
+            f"it diverged in {len(frames)} frame{'s' * (len(frames) > 1)}, first at "
+            f"{first_s:.1f} s: a variance ceased to be positive, and the landmarks were dropped",
+        )
+
+
+def _truth(run: Run) -> Iterator[Remark]:
+    """Whether the error is what the covariance says, where the recording knows the true poses."""
+    if truth_in(run.messages) is None:
+        return
+    figures = judge(run.messages)
+    nees, frames = figures.get("nees_per_dof"), figures.get("truth_frames") or 0
+    if nees is None or frames < TRUTH_FEW:
+        return
+    words = f"beside the recording's truth its errors are {np.sqrt(nees):.2g} times as large as it "
+    words += f"says (NEES/6 {nees:.3g}; 1 is expected)"
+    grade = Grade.BAD if nees > NEES_BAD else Grade.CARE if nees > NEES_HIGH else Grade.GOOD
+    yield Remark(grade, words)
+
+
+def _gate(run: Run) -> Iterator[Remark]:
     """The share, and where in the drive it is far above the usual."""
     share = run.gated_share
     grade = Grade.BAD if share > GATED_MOST else Grade.CARE if share > GATED_MANY else Grade.GOOD
     words = f"the gate rejects {share:.1%} of the matches"
-    worst = _worst_window(run, origin_ns)
+    if share > 2 * GATED_USUAL:
+        words += f" where {GATED_USUAL:.0%} is expected: the rest it takes for wrong"
+    worst = _worst_window(run, run.origin_ns)
     if worst is not None and worst[2] > max(WORSE * share, GATED_MANY):
         words += f", {worst[2]:.0%} of them from {worst[0]:.0f} to {worst[1]:.0f} s"
     yield Remark(grade, words)
@@ -193,32 +334,18 @@ def _used(run: Run) -> Iterator[Remark]:
         yield Remark(Grade.CARE, f"only {used:.0f} observations of a frame are used (median)")
 
 
-def _nis(run: Run, tuned: Tuned) -> Iterator[Remark]:
+def _nis(run: Run, known: Known) -> Iterator[Remark]:
+    """More than the settings say is a doubt; less is none, for what lasts is in the noises, too."""
+    if not np.isfinite(run.nis):
+        return
     words = f"what frames show differs from what was expected (innovations) by {run.nis:.2f} times "
     words += "the variance that the settings say"
-    if tuned.noise.drifts:
-        yield Remark(
-            Grade.GOOD, f"{words}; less than once, for pixel-sigma stands for drift as well"
-        )
-    elif run.nis < NIS_LOW and tuned.halves is not None and tuned.halves.is_larger:
-        yield Remark(
-            Grade.GOOD, f"{words}; less than once, for the noises stand for what points share"
-        )
-    elif run.nis < NIS_LOW and tuned.noise.rows_px > 0:
-        yield Remark(
-            Grade.GOOD, f"{words}; less than once, for pixel-sigma stands for the rectification"
-        )
-    elif NIS_LOW <= run.nis <= NIS_HIGH:
-        yield Remark(Grade.GOOD, words)
+    drifts = known.noise is not None and known.noise.drifts
+    if run.nis <= NIS_HIGH or drifts:
+        less = "; less than once: it is surer than it says, or the noises stand for what lasts"
+        yield Remark(Grade.GOOD, words + less * bool(run.nis < NIS_LOW))
     else:
-        due = starting_pixel(run) * float(np.sqrt(run.nis))
-        words += ": the noise is not what these settings describe"
-        yield Remark(Grade.CARE, f"{words}; pixel-sigma = {due:.2g} would be about right")
-
-
-def starting_pixel(run: Run) -> float:
-    """The pixel-sigma of a run."""
-    return in_force(run.messages, "pixel-sigma") or 1.0
+        yield Remark(Grade.CARE, f"{words}: the noise is not what these settings describe")
 
 
 def _biases(run: Run) -> Iterator[Remark]:
@@ -241,37 +368,56 @@ def _biases(run: Run) -> Iterator[Remark]:
             )
 
 
-def _tracks(tuned: Tuned) -> Iterator[Remark]:
-    noise = tuned.noise
+def _tracks(run: Run, known: Known) -> Iterator[Remark]:
+    noise = known.noise
+    if noise is None:
+        return
     if noise.rows is not None and noise.rows_px > 0:
         yield Remark(
             Grade.CARE,
             f"the rectification is off: the rows of left and right differ by "
             f"{noise.rows.smooth_px:.2f} px RMS, smoothly over the picture and up to "
             f"{noise.rows.largest_px:.1f} px, which all points share: in pixel-sigma, "
-            f"{noise.rows_px:.2g} px stand for that. A better calibration is due",
+            f"{noise.rows_px:.2g} px stand for that. A better calibration would mend it",
         )
     if not noise.drifts:
         return
-    known = {lag: sigma for lag, sigma in noise.by_lag.items() if np.isfinite(sigma)}
-    first, last = min(known), max(known)
+    lags = {lag: sigma for lag, sigma in noise.by_lag.items() if np.isfinite(sigma)}
+    first, last = min(lags), max(lags)
     yield Remark(
         Grade.CARE,
-        f"the tracks drift: points are off by {known[first]:.2f} px after {first} frame and by "
-        f"{known[last]:.2f} px after {last}; track-drift {tuned.settings.get(DRIFT, '0')} and in "
-        f"pixel-sigma {noise.stands_for_px:.2g} px or more stand for that. Timing, clocks and the "
-        "noise of single axes cannot be told by the likelihood of single steps then, and stay as "
-        "given",
+        f"the tracks drift: points are off by {lags[first]:.2f} px after {first} frame and by "
+        f"{lags[last]:.2f} px after {last}; track-drift {in_force(run.messages, DRIFT) or 0:.2g} "
+        f"and pixel-sigma {in_force(run.messages, PIXEL) or 0:.2g} px are set for that",
     )
 
 
-def _halves(tuned: Tuned) -> Iterator[Remark]:
+def _for_tracks(run: Run, known: Known) -> dict[str, str]:
+    """Settings that stand for what the tracks show, where those of the run do not."""
+    noise = known.noise
+    if noise is None or not noise.drifts:
+        return {}
+    was = f"{in_force(run.messages, DRIFT) or 0.0:g}"
+    told = noise.setting({DRIFT: was, "model": _model(run)})
+    told = {} if told.get(DRIFT) == was else told
+    pixel_px = in_force(run.messages, PIXEL)
+    if pixel_px and noise.stands_for_px > pixel_px and told_apart(noise.stands_for_px, pixel_px):
+        told[PIXEL] = f"{noise.stands_for_px:.3g}"
+    return told
+
+
+def _model(run: Run) -> str:
+    model = in_force(run.messages, "model")
+    return "" if model is None else SETTINGS[IDS["model"]].words[int(model)]
+
+
+def _halves(tuned: Tuned) -> Iterator[str]:
     """Whether parts of the points tell the same motion."""
     found = tuned.halves
     if found is None or not np.isfinite(found.before.ratio):
         return
     if not found.before.ratio > found.before.by_chance:
-        yield Remark(Grade.GOOD, "each half of the points alone leads where all of them lead")
+        yield "each half of the points alone leads where all of them lead"
         return
     farther = f"{np.sqrt(found.before.ratio):.2g} times as far"
     words = f"half of the points alone ({found.before.way}) leads {farther} from where all of them "
@@ -282,7 +428,7 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
         words += "estimate stays, and is less sure"
     else:
         words += "; larger noises would not mend it, and none are written"
-    yield Remark(Grade.CARE, words)
+    yield words
 
 
 def of_calibration(found: Calibration, own: Estimated | None = None) -> Iterator[Remark]:
@@ -333,53 +479,3 @@ def of_scale(doubt: Doubt) -> Iterator[Remark]:
         why = f"this drive does not tell the scale of the stereo pair better: {shown}"
         off += ". A longer drive tells more"
     yield Remark(Grade.CARE if doubt.is_off or hidden else Grade.GOOD, f"{why}; {off}")
-
-
-def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
-    """`pixel-sigma 2 should be 1`: what differs by more than a fifth, or in words."""
-    return [
-        f"{' '.join(filter(None, (name, was)))} should be {due}"
-        for name, was, due in _changed(given, header, tuned, by_imu)
-    ]
-
-
-def lines(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
-    """The same as lines of a config."""
-    return [f"{name} = {due}" for name, _, due in _changed(given, header, tuned, by_imu)]
-
-
-def _changed(
-    given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
-) -> Iterator[tuple[str, str, str]]:
-    """Name, what it was if that is a number, and what it should be."""
-    parameters = of_process(by_imu)
-    before = starting(header, given, parameters)
-    for name, parameter in parameters.items():
-        written = tuned.settings.get(parameter.setting, "")
-        after = [float(part) for part in written.split(",") if part]
-        was = [before[name]] if name in before else [before[f"{name}-{axis}"] for axis in "xyz"]
-        count = max(len(was), len(after))
-        pairs = zip(was * (count // len(was)), after * (count // max(len(after), 1)), strict=False)
-        ratios = [max(x / y, y / x) for x, y in pairs if x > 0]
-        if ratios and max(ratios) > OTHER_SIGMA:
-            yield parameter.setting, ",".join(f"{x:.3g}" for x in was), written
-    for setting in KEPT:
-        value = tuned.settings.get(setting)
-        if value is not None and value != given.get(setting, _usual(setting, header)):
-            yield setting, "", value
-
-
-KEPT = (
-    "twist-timing",
-    "imu-timing",
-    "bias",
-    "camera-offset",
-    "baseline-sigma",
-    CAMERA_TURN,
-    DRIFT,
-)
-
-
-def _usual(setting: str, header: Header) -> str:
-    usual = {"twist-timing": header.twist_timing.name.lower(), "bias": "on", "imu-timing": "mid"}
-    return usual.get(setting, "0")

@@ -12,15 +12,14 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, settings_given
-from pelorus.console import out, print_json
+from pelorus.console import VERDICT_COLOURS, out, print_json, steps
 from pelorus.errors import write_text
 from pelorus.replay import find_programs
 
 if TYPE_CHECKING:
     from pelorus.check.checked import Checked
 
-COLOURS = ("green", "yellow", "red")
-MARKS = ("good", "care", "bad")
+COLOURS = {**VERDICT_COLOURS, "note": "dim"}
 
 app = typer.Typer()
 
@@ -48,9 +47,10 @@ def check(
     """Can a recording be trusted, what is wrong with it, and which settings suit it?
 
     Replays it some hundred times: noise, twist timing, the camera's clock and the biases are those
-    that make what was seen likeliest. Truth is not looked at. Writes the settings, and shows what
+    that make what was seen likeliest. Writes the settings, and shows what
     the filter says of itself before and after. Where a fault stands in the way of that, no
-    settings are written, and the exit status is 1.
+    settings are written, and the exit status is 1. The search does not look at truth; the verdict
+    does where the recording has one, and is that of `report` and `explain` with these settings.
     """
     from pelorus.check import checked  # noqa: PLC0415 - scipy loads slowly
 
@@ -58,7 +58,7 @@ def check(
         raise typer.BadParameter("are seen on a --page alone", param_hint="--pictures")
     given = settings_given(config, settings)
     program = find_programs(programs).float32
-    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+    with steps(checked.STEPS), tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         found = checked.check(program, recording, given, Path(folder))
         if page is not None:
             _write(page, found, recording, program, Path(folder), pictures, calibration)
@@ -101,16 +101,19 @@ def _write(
     messages = wire.messages_of(outputs.log)
     explained = explain(messages)
     answer = answers.of_check(found, recording.name, explained)
+    answer = answers.with_setup(answer, messages)
     if pictures is not None:
         answer = answers.with_footage(answer, footage(messages, explained, pictures, calibration))
     write(page, answer, Curves(messages))
 
 
 def _tell(found: Checked, tuned: Path) -> None:
-    out.print(f"[bold {COLOURS[found.grade]}]{found.verdict}[/]")
+    out.print(f"[bold {COLOURS[found.verdict.mark]}]{escape(found.verdict.words)}[/]")
+    if found.was:
+        out.print(escape(found.was))
     out.print(f"[bold]next[/]  {escape(found.next_step(tuned))}")
     for remark in found.remarks:
-        out.print(f"  [{COLOURS[remark.grade]}]{MARKS[remark.grade]}[/]  {escape(remark.text)}")
+        out.print(f"  [{COLOURS[remark.mark]}]{remark.mark}[/]  {escape(remark.text)}")
     if found.tuned is None:
         out.print("nothing was tuned, and no settings were written")
         return
@@ -129,10 +132,13 @@ def _tell(found: Checked, tuned: Path) -> None:
 
 def _json(found: Checked, tuned: Path) -> dict[str, Any]:
     return {
-        "verdict": found.verdict,
+        **found.verdict.json(),
+        "as_given": None if found.as_given is None else found.as_given.words,
         "next": found.next_step(tuned),
-        "grade": MARKS[found.grade],
-        "remarks": [{"grade": MARKS[r.grade], "text": r.text} for r in found.remarks],
+        "remarks": [
+            {"grade": r.grade.name.lower(), "text": r.text, "note": r.is_note}
+            for r in found.remarks
+        ],
         "health": found.spells,
         "changes": found.changes,
         "figures": {title: {"before": a, "after": b} for title, a, b in found.rows},

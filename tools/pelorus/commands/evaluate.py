@@ -77,6 +77,9 @@ def evaluate(
     tolerance: float = typer.Option(
         1e-6, metavar="S", help="Times that differ by no more are equal."
     ),
+    sim3: bool = typer.Option(
+        False, "--sim3", help="Also with the scale that fits best (Sim(3)), and that scale."
+    ),
     config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
@@ -115,6 +118,7 @@ def evaluate(
         else:
             accuracy = assess(estimate, reference, tolerance_ns=tolerance_ns)
             found |= accuracy.figures if accuracy else {"truth_frames": 0}
+        found |= _with_scale(estimate, reference, tolerance_ns, messages) if sim3 else {}
         asked = _doubts(truth, (source, estimate), reference, tolerance_ns, bool(messages))
         _require_something(found, (source, estimate), (truth or source, reference), messages)
     told = calibrated.last_calibrated(messages)
@@ -127,6 +131,15 @@ def evaluate(
         _show(found)
     for question in asked:
         (err if as_json else out).print(f"    -> {escape(question)}")
+
+
+def _with_scale(
+    estimate: Trajectory, reference: Trajectory, tolerance_ns: int, messages: list[Message]
+) -> Figures:
+    if messages:
+        reference = evaluation.on_its_clock(messages, reference, estimate)
+    accuracy = assess(estimate, reference, tolerance_ns=tolerance_ns)
+    return {} if accuracy is None else accuracy.sim3
 
 
 def _doubts(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from pelorus.commands.choices import CALIBRATION, LOG, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import out, print_json
+from pelorus.console import out, print_json, tell_verdict, waiting
 from pelorus.replay import whole_log_of
 
 if TYPE_CHECKING:
@@ -59,7 +59,9 @@ def explain(
         raise typer.BadParameter("what they ask for is seen on a --page alone", param_hint=where)
     options = replay_options(config, settings)
     messages = whole_log_of(source, options, programs)
-    found = explained(messages)
+    with waiting(f"explaining {source.name}"):
+        found = explained(messages)
+        verdict = found.verdict
     if page is not None:
         other = None
         if beside is not None or beside_settings:
@@ -68,8 +70,9 @@ def explain(
             other = named, whole_log_of(beside or source, [*options, *changed], programs)
         _write(page, source.name, found, messages, other, pictures, calibration)
     if as_json:
-        print_json(found.json())
+        print_json({**verdict.json(), **found.json()})
         return
+    tell_verdict(verdict)
     for line in found.lines():
         out.print(line, markup=False)
 
@@ -103,6 +106,7 @@ def _write(
         tables = [*side_by_side(first, second), *drift_table([first, second])]
         facts = f"Dashed curves are those of {other[0]}."
     answer = answers.of_explanation(found, name, tables, facts)
+    answer = answers.with_setup(answer, messages)
     if pictures is not None:
         answer = answers.with_footage(answer, footage(messages, found, pictures, calibration))
     write(page, answer, curves)

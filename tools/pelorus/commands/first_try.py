@@ -10,9 +10,10 @@ from pathlib import Path
 import typer
 from rich.markup import escape
 
-from pelorus.console import out
+from pelorus.console import out, step, steps
 from pelorus.errors import Existing, PelorusError, made, resolved
 
+STEPS_OF_CHECK, STEPS_OF_REPORT = 5, 3  # theirs load slowly
 RECORDINGS = (".plr", ".plr.zst")
 BAGS = (".bag", ".mcap", ".db3")
 
@@ -95,16 +96,26 @@ def first_try(
     kind = _format_of(source)
     name = source.name.removesuffix(".zst").removesuffix(".plr") or resolved(source).name
     into = made(folder or Path(f"try-{name}"))
+    with steps(bool(kind) + STEPS_OF_CHECK + STEPS_OF_REPORT):
+        status = _all(source, kind, name, into, context.args, force)
+    if status:
+        raise typer.Exit(status)
+
+
+def _all(
+    source: Path, kind: str, name: str, into: Path, own: list[str], force: tuple[str, ...]
+) -> int:
+    """The exit status."""
     recording = source
     if kind:
+        step("converting")
         recording = into / f"{name}.plr"
-        if status := _run("convert", kind, str(source), str(recording), *context.args, *force):
-            raise typer.Exit(status)
-    elif context.args:
-        raise PelorusError(f"{' '.join(context.args)}: {source} needs no conversion")
+        if status := _run("convert", kind, str(source), str(recording), *own, *force):
+            return status
+    elif own:
+        raise PelorusError(f"{' '.join(own)}: {source} needs no conversion")
     tuned = into / "tuned.conf"
     status = _run("check", str(recording), "--out", str(tuned), *force)
     settings = ("--config", str(tuned)) if status == 0 and tuned.is_file() else ()
     _run("report", str(recording), "--out", str(into), *settings, *force)
-    if status:
-        raise typer.Exit(status)
+    return status

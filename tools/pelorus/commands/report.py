@@ -12,17 +12,24 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out, print_json, progress
-from pelorus.errors import Existing, made, whole_folder
+from pelorus.console import err, out, print_json, progress, step, steps, tell_verdict, waiting
+from pelorus.errors import Existing, PelorusError, made, whole_folder
 from pelorus.extras import figures_missing
 from pelorus.replay import find_programs
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
+from pelorus.trajectory import read_stamped
 
 if TYPE_CHECKING:
+    from pelorus.check.verdict import Verdict
     from pelorus.report.comparison import Comparison
+    from pelorus.report.curves import Other
+    from pelorus.report.results import Run
+    from pelorus.trajectory import Trajectory
 
 PAGE = "report.html"
+STEPS = 3
+SAME_NS = 1_000_000  # times of another program's way that are a frame's
 DRAWINGS = ("map", "covariance", "top-view", "hero")  # that a recording may have
 OLDER = (  # pictures of earlier versions, which would be taken for this report's
     *("error-yours", "error-world", "error-course", "nees", "bias", "observations", "time"),
@@ -54,6 +61,12 @@ def report(
     ),
     settings: list[str] = SETTINGS,
     also: list[Also] = typer.Option([], help="One run more, for comparison; repeatable."),
+    beside: list[Path] = typer.Option(
+        [],
+        "--beside",
+        metavar="FILE.tum",
+        help="Another program's way of this drive, drawn and compared too; repeatable.",
+    ),
     pictures: Path | None = PICTURES,
     calibration: list[Path] = CALIBRATION,
     as_json: bool = typer.Option(False, "--json", help="What it tells as one JSON object."),
@@ -72,19 +85,21 @@ def report(
     require_twists(subject, also)
     options = replay_options(config, settings)
     plans = plan_runs(find_programs(programs), recording, options, also)
-    with whole_folder(folder) as part:
+    with steps(STEPS), whole_folder(folder) as part:
+        step("replaying")
         runs_folder = made(part / "runs")
         runs = [carry_out(plan, subject, runs_folder) for plan in progress(plans, "replaying")]
 
         from pelorus.report.comparison import Comparison  # noqa: PLC0415 - scipy loads slowly
 
         compared = Comparison(subject, runs)
-        lines = _draw(compared, part, pictures, calibration)
+        ways = {path.stem: read_stamped(path) for path in beside}
+        verdict, lines = _draw(compared, part, ways, pictures, calibration)
         _remove_pictures(folder)
     if as_json:
-        print_json(_json(compared, lines, folder / PAGE))
+        print_json(_json(compared, verdict, lines, folder / PAGE))
     else:
-        _tell(compared, lines, folder / PAGE)
+        _tell(compared, verdict, lines, folder / PAGE)
 
 
 def _remove_pictures(folder: Path) -> None:
@@ -94,31 +109,53 @@ def _remove_pictures(folder: Path) -> None:
 
 
 def _draw(
-    compared: Comparison, folder: Path, source: Path | None, calibration: list[Path]
-) -> list[str]:
-    """The pictures and the page; the verdicts on it."""
+    compared: Comparison,
+    folder: Path,
+    ways: dict[str, Trajectory],
+    source: Path | None,
+    calibration: list[Path],
+) -> tuple[Verdict, list[str]]:
+    """The pictures and the page; the verdict on it, and what is off besides."""
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page  # noqa: PLC0415 - as above
     from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
     from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
+    step("pictures")
     shown = _draw_pictures(compared, folder)
-    lines = words.verdicts(compared)
+    lines = words.remarks(compared)
     main = compared.main
     others = {
         run.name: Other(run.trajectory, compared.accuracy.get(run.name))
         for run in compared.runs
         if run is not main
     }
+    for name, way in ways.items():
+        others[name] = _other(name, way, main, compared.subject.truth)
     curves = Curves(main.messages, compared.subject.truth, others)
+    step("the verdict")
     found = explain(main.messages)
+    with waiting("judging"):
+        verdict = found.verdict
     drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
+    answer = answers.with_setup(answer, main.messages)
     if source is not None:
         answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
     page.write(folder / PAGE, answer, curves)
-    return lines
+    return verdict, lines
+
+
+def _other(name: str, way: Trajectory, main: Run, truth: Trajectory | None) -> Other:
+    """Brought to the first common pose; PelorusError where there is none."""
+    from pelorus.evaluation import assess, beside  # noqa: PLC0415 - scipy loads slowly
+    from pelorus.report.curves import Other  # noqa: PLC0415 - as above
+
+    brought = beside(way, main.trajectory, SAME_NS)
+    if brought is None:
+        raise PelorusError(f"--beside {name}: none of its times is that of a frame")
+    return Other(brought, None if truth is None else assess(brought, truth))
 
 
 def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, Path]]:
@@ -138,18 +175,20 @@ def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, P
     return shown
 
 
-def _json(compared: Comparison, lines: list[str], page: Path) -> dict[str, Any]:
+def _json(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) -> dict[str, Any]:
     """The same as `_tell`, and all figures of each run."""
     return {
         "report": str(page),
         "recording": str(compared.subject.path),
-        "verdicts": lines,
+        **verdict.json(),
+        "remarks": lines,
         "health": compared.main.health.told(compared.origin_ns),
         "runs": {run.name: run.summary for run in compared.runs},
     }
 
 
-def _tell(compared: Comparison, lines: list[str], page: Path) -> None:
+def _tell(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) -> None:
+    tell_verdict(verdict)
     rows = (words.titles(compared), *(words.row(compared, run) for run in compared.runs))
     head, *figures = zip(*rows, strict=True)
     table = Table(box=None, pad_edge=False)  # a column a run: that fits on the narrowest terminal

@@ -12,8 +12,9 @@ from rich.markup import escape
 
 from pelorus.commands.choices import CONFIG, LOG, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
-from pelorus.errors import PelorusError, whole
+from pelorus.errors import PelorusError, whole, write_text
 from pelorus.replay import whole_log_of
+from pelorus.view.layout import layout
 
 if TYPE_CHECKING:
     from pelorus.view.drive import Viewer
@@ -30,6 +31,9 @@ def view(
     mcap: Path | None = typer.Option(
         None, "--mcap", metavar="OUT.mcap", help="Keep it as MCAP with Foxglove's schemas."
     ),
+    layout_file: Path | None = typer.Option(
+        None, "--layout", metavar="OUT.json", help="A layout for Foxglove that shows the MCAP."
+    ),
     spawn: bool = typer.Option(False, "--spawn", help="Start Rerun's viewer, and show it there."),
     connect: str | None = typer.Option(
         None, "--connect", metavar="URL", help="Show it in a viewer that runs, on any machine."
@@ -38,20 +42,23 @@ def view(
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
 ) -> None:
-    """A log in three dimensions and over time, in Rerun or Foxglove.
+    r"""A log in three dimensions and over time, in Rerun or Foxglove.
 
     Pose with its three-sigma ellipsoid, way, truth, landmarks with theirs, points in the picture
     with those that were rejected, health and why, innovations, biases, what the supervisor saw,
-    computing time. It needs `pip install 'pelorus-slam[view]'`. While a robot drives, `pelorus
+    computing time. It needs `pip install 'pelorus-slam\\[view]'`. While a robot drives, `pelorus
     stream --view` shows the same.
     """
-    if not (rrd or mcap or spawn or connect):
-        where = "--rrd / --mcap / --spawn / --connect"
+    if not (rrd or mcap or layout_file or spawn or connect):
+        where = "--rrd / --mcap / --layout / --spawn / --connect"
         raise typer.BadParameter("say where to show it", param_hint=where)
     files = [path for path in (rrd, mcap) if path is not None]
     for path in files:
         if path.exists() and source.exists() and path.samefile(source):
             raise PelorusError(f"{path}: is the log itself; another name is due")
+    if layout_file is not None:
+        write_text(layout_file, layout())
+        files.append(layout_file)
     from pelorus.view.drive import show  # noqa: PLC0415 - scipy loads slowly
     from pelorus.view.in_foxglove import InFoxglove  # noqa: PLC0415
     from pelorus.view.in_rerun import InRerun  # noqa: PLC0415

@@ -36,6 +36,8 @@ OXTS_NUMBERS = 30
 RAW_PAIRS = (("image_00", "image_01"), ("image_02", "image_03"))
 ODOMETRY_PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))
 AHEAD = np.array([[0, -1.0, 0], [0, 0, -1], [1, 0, 0]])  # of a body x forward, y left, z up
+# The attitude that a truth begins with is known to 0.01 rad at best: else NEES is the truth's.
+OF_TRUTH = {"start-sigma": 0.01}
 # Of an OXTS packet.
 LAT, LON, ALT, ROLL, PITCH, YAW, VF, WX = 0, 1, 2, 3, 4, 5, 8, 17
 
@@ -68,7 +70,9 @@ def is_raw(folder: Path) -> bool:
 
 def read(folder: Path, asked: Asked, made: Made) -> Streams:
     """A raw drive or a sequence of the odometry benchmark."""
-    return _raw(folder, asked) if is_raw(folder) else _odometry(folder, asked, made)
+    found = _raw(folder, asked) if is_raw(folder) else _odometry(folder, asked, made)
+    own = found.truth is not None and asked.truth is None
+    return replace(found, settings=OF_TRUTH) if own else found
 
 
 # --- raw ------------------------------------------------------------------------------------------

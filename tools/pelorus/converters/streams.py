@@ -134,6 +134,7 @@ class Streams:
     small: list[Reading] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     on_earth: bool = False  # its positions are east, north and up of a place
+    settings: dict[str, float] = field(default_factory=dict)  # what is known of the filter's
 
     @property
     def told(self) -> list[str]:
@@ -230,7 +231,14 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
     # with its first twist or reading the filter begins
     small = [reading for reading in streams.small if reading.t_ns >= first_ns]
     return Recording(
-        header, *moved, t_ns, tracks, readings=small, remarks=remarks, inertial=inertial
+        header,
+        *moved,
+        t_ns,
+        tracks,
+        readings=small,
+        remarks=remarks,
+        inertial=inertial,
+        settings=streams.settings,
     )
 
 

@@ -30,6 +30,7 @@ LOOK_BACK_S = 2.0  # before the supervisor is sure
 LEARN_S = 5.0  # of what is usual, before that
 LEARN_LEAST = 10  # steps
 LOOK_ON_S = 4.0
+LOOK_MOST_S = 30.0  # of what lasts on, to tell how long
 SIGMAS = 8.0  # of six numbers a step: chance does not reach it; learnt sigmas are rough
 MEDIAN_OF = 7  # steps: what their median differs by lasts
 MEDIAN_SIGMA = 1.2533  # of the median of many, times the root of their number, over one's sigma
@@ -75,7 +76,8 @@ def _stretches(log: Log) -> list[tuple[int, int]]:
 def _looked_at(log: Log, first: int, last: int) -> Finding | None:
     begin = log.t_ns[first]
     low = int(np.searchsorted(log.t_ns, begin - (LOOK_BACK_S + LEARN_S) * S))
-    high = int(np.searchsorted(log.t_ns, begin + LOOK_ON_S * S))
+    lasts_s = min((log.t_ns[last] - begin) / S, LOOK_MOST_S)
+    high = int(np.searchsorted(log.t_ns, begin + max(lasts_s, LOOK_ON_S) * S))
     if high - low < LEARN_LEAST:
         return _as_told(log, first, last)
     steps = measured(log, low, high)
@@ -172,7 +174,7 @@ def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, i
     )
     noticed = int(log.t_ns[stretch[0]])
     begin = min(int(log.t_ns[steps.first + k]), noticed)
-    end = max(begin, int(log.t_ns[stretch[1]]))
+    end = max(begin, _end(log, steps, k, lasting, stretch[1]))
     if axis < 3:
         words = (
             f"the odometry says {told:.2f} m/s along {AXES[axis]}, the pictures {seen:.2f} m/s: "
@@ -184,6 +186,15 @@ def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, i
         f"the pictures {seen:.3f} rad/s"
     )
     return Finding(Cause.TURN_CONTRADICTED, begin, end, words, noticed)
+
+
+def _end(log: Log, steps: Steps, k: int, lasting: Floats, last: int) -> int:
+    """Until when the two differ, which may be less than the doubt; the doubt's end if unseen."""
+    off = np.flatnonzero((lasting[k:] > SIGMAS).any(axis=1))
+    apart = np.flatnonzero(np.diff(off) > MEDIAN_OF)
+    end = k + int(off[apart[0]] if len(apart) else off[-1])
+    known = end + MEDIAN_OF < len(lasting)
+    return int(log.t_ns[steps.first + end + 1] if known else log.t_ns[last])
 
 
 def measured(log: Log, low: int, high: int) -> Steps:

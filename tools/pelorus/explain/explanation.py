@@ -6,8 +6,9 @@ what was seen before.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,12 +16,17 @@ from pelorus import schema
 from pelorus.explain.contradiction import contradictions
 from pelorus.explain.finding import Cause, Finding, S
 from pelorus.explain.inputs import of_inputs, rejected
-from pelorus.explain.log import FEW, Flags, Log, log_of
+from pelorus.explain.log import FEW, Flags, Log, log_of, runs
 from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
 from pelorus.explain.small import of_small
 from pelorus.explain.stamps import of_stamps
-from pelorus.frames import Kind, Message
+from pelorus.frames import Kind, Message, Text
 from pelorus.health import LOST, Spell, TimeLine, time_line
+
+if TYPE_CHECKING:
+    from pelorus.check.verdict import Verdict
+
+NOT_POSITIVE = schema.number("reason", "NOT_POSITIVE")
 
 APART_NS = S  # what begins later than that after the end of another is an episode of its own
 TOGETHER_NS = S  # what begins within is told in the order of causes
@@ -29,6 +35,7 @@ LINES = 20
 LASTS_S = 0.05  # what is shorter is a moment
 EPISODES_TOLD = 4
 SPELLS_TOLD = 3
+TEXTS_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,19 @@ class Explanation:
     health: TimeLine
     remarks: tuple[str, ...] = ()  # what the log lacks
     unexplained: tuple[Spell, ...] = ()  # health that was not good, and no finding says why
+    messages: Sequence[Message] = field(default=(), repr=False, compare=False)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the run can be trusted, as every command says it."""
+        from pelorus.check.verdict import verdict_of_log  # noqa: PLC0415 - it takes seconds
+
+        return verdict_of_log(self.messages)
+
+    @property
+    def diverged(self) -> int:
+        """How many of the episodes are divergences."""
+        return sum(episode.first.cause is Cause.DIVERGED for episode in self.episodes)
 
     @property
     def first(self) -> Finding | None:
@@ -77,19 +97,25 @@ class Explanation:
         return (t_ns - self.origin_ns) / S
 
     def lines(self) -> list[str]:
-        """At most twenty."""
+        """At most twenty, without the verdict."""
         out = list(self._head())
         out += [f"log: {words}" for words in self.remarks]
         out += [f"setup: {words}" for words in self.setup]
         out += self._unexplained()
-        told = min(len(self.episodes), EPISODES_TOLD)
-        room = (LINES - 1 - len(out)) // max(told, 1)
-        for number, episode in enumerate(self.episodes[:told], 1):
+        told = self._most_telling()
+        room = (LINES - 1 - len(out)) // max(len(told), 1)
+        for number, episode in told:
             out += self._episode(number, episode, room)
         hidden = len(self.episodes) - EPISODES_TOLD
         if hidden > 0:
             out.append(f"{hidden} more: --json has all of them")
         return out[:LINES]
+
+    def _most_telling(self) -> list[tuple[int, Episode]]:
+        """With their numbers, in the order of time: divergences before all others."""
+        numbered = list(enumerate(self.episodes, 1))
+        worst = sorted(numbered, key=lambda one: one[1].first.cause is not Cause.DIVERGED)
+        return sorted(worst[:EPISODES_TOLD], key=lambda one: one[0])
 
     def _head(self) -> Iterator[str]:
         count = len(self.episodes)
@@ -99,6 +125,8 @@ class Explanation:
             what, along = "no event", ", but something is wrong all along"
         if count == 1:
             what += f" ({self.episodes[0].first.cause})"
+        elif self.diverged:
+            what += f", {self.diverged} of them {Cause.DIVERGED}"
         yield f"{what} in {whole:.1f} s{along}; health: {self.health.summary()}"
 
     def _unexplained(self) -> Iterator[str]:
@@ -184,14 +212,15 @@ def explain(messages: Sequence[Message]) -> Explanation:
         found += [one for one in rejected(log) if not _near(one, found)]
     if not setup:  # a filter whose sigmas are wrong is lost now and then, and nothing happened
         found += list(_unexplained(log, health, found))
-    groups = _grouped(sorted(found, key=_order))
+    groups = [*_grouped(sorted(found, key=_order)), *_grouped(list(divergences(log)))]
+    groups.sort(key=lambda group: _order(group[0]))
     episodes = tuple(_episode(log, group, health) for group in groups)
     end_ns = int(log.t_ns.max())
     told = {spell for episode in episodes for spell in episode.spells}
     rest = () if setup else tuple(spell for spell in health.spells if spell not in told)
     refused = refusals(log)
     remarks = (*([] if refused in ("", *setup) else [refused]), *_remarks(log, messages))
-    return Explanation(log.origin_ns, end_ns, episodes, setup, health, remarks, rest)
+    return Explanation(log.origin_ns, end_ns, episodes, setup, health, remarks, rest, messages)
 
 
 def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
@@ -204,6 +233,20 @@ def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
         yield "it has no END: it was cut short, and what came later is not told"
     if not len(log.readings):
         yield "it holds no twists and no readings of an IMU: pictures are compared with nothing"
+
+    texts = [m.text for m in messages if isinstance(m, Text)]
+    yield from (f"the recording says: {words}" for words in texts[:TEXTS_TOLD])
+    if len(texts) > TEXTS_TOLD:
+        yield f"and {len(texts) - TEXTS_TOLD} remarks more: pelorus info"
+
+
+def divergences(log: Log) -> Iterator[Finding]:
+    """Frames after which a variance was not positive: arithmetic that failed, whatever came in."""
+    for first, last in runs(log.said(NOT_POSITIVE)):
+        count = last - first + 1
+        words = f"a variance ceased to be positive in {count} frame{'s' * (count > 1)}; the filter "
+        words += "went on from its pose and dropped its landmarks"
+        yield Finding(Cause.DIVERGED, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
 def _behind(found: Finding, inputs: Sequence[Finding]) -> Finding:
@@ -229,7 +272,7 @@ def _calm(log: Log, begin_ns: int | None) -> Flags:
 def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterator[Finding]:
     """Where the filter was lost and nothing that is found tells why."""
     for spell in health.spells:
-        if spell.health < LOST or _near(spell, found):
+        if spell.health < LOST or _near(spell, (*found, *divergences(log))):
             continue
         meanwhile = (log.t_ns >= spell.from_ns) & (log.t_ns <= spell.to_ns)
         seen = log.column("observations")[meanwhile]
@@ -283,4 +326,4 @@ def _before(log: Log, t_ns: int) -> str:
     health = int(log.column("health")[rows].max())
     words = f"health {schema.HEALTHS[health]}, {np.median(matched):.0f} points matched and "
     words += f"{np.median(used):.0f} used a frame"
-    return words + (f", NIS {nis / dof:.2f} (1 is due)" if dof else "")
+    return words + (f", NIS {nis / dof:.2f} (1 is expected)" if dof else "")

@@ -28,6 +28,7 @@ class Cause(StrEnum):
     CONTRADICTED = "contradicted"
     WRONG_MATCHES = "wrong-matches"
     LOST = "lost"
+    DIVERGED = "diverged"
     SETTINGS = "settings"
 
 
@@ -73,5 +74,7 @@ REMEDIES = {
     Cause.CONTRADICTED: "`pelorus check` on the recording: scale, axes, clocks",
     Cause.WRONG_MATCHES: "look at the front end's matches (`pelorus report --pictures`)",
     Cause.LOST: "`pelorus report` shows the points of each frame, and which were rejected",
+    Cause.DIVERGED: "keep this log and report it: no input should do that. Beside "
+    "pelorus-replay-f64 it shows whether rounding did it",
     Cause.SETTINGS: "`pelorus check` on the recording writes settings that fit",
 }

@@ -9,10 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pelorus.check.verdict import NOISES, Verdict
 from pelorus.explain.explanation import Episode, Explanation
-from pelorus.health import LOST
+from pelorus.explain.log import log_of
+from pelorus.frames import Message
+from pelorus.report.about import tables_of
 from pelorus.report.footage import CAPTION, Footage
-from pelorus.report.page import GRADES, Answer, Event, Table
+from pelorus.report.page import Answer, Event, Table
+from pelorus.report.spectra import drawings
 
 if TYPE_CHECKING:
     from pelorus.check.checked import Checked
@@ -21,9 +25,9 @@ if TYPE_CHECKING:
 UNEXPLAINED_MOST = 20  # spells that are told on a page
 MEANING = (
     "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
-    "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is due. Used "
-    "and gated: observations. Map, where it has columns: RMS distance of the landmarks from where "
-    "the recording knows them to be, with its NEES an axis. Poses that were given, in mode "
+    "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is expected. "
+    "Used and gated: observations. Map, where it has columns: RMS distance of the landmarks from "
+    "where the recording knows them to be, with its NEES an axis. Poses that were given, in mode "
     "mapping, have no error. The last column: time of the recording over time of the computing. "
     "Yours is the filter with the settings that were given, in float32 like dead reckoning, which "
     "is the twists alone."
@@ -43,24 +47,42 @@ def with_footage(answer: Answer, shown: Footage) -> Answer:
     return replace(answer, moments=shown.moments, about_moments=f"{left_out} {CAPTION}")
 
 
+def with_setup(answer: Answer, messages: Sequence[Message]) -> Answer:
+    """The same with settings, calibration and remarks, and with what no time runs through."""
+    drawn = tuple(drawings(log_of(messages)))
+    return replace(answer, tables=[*answer.tables, *tables_of(messages)], drawings=drawn)
+
+
 def of_explanation(
-    found: Explanation, title: str, tables: Sequence[Table] = (), facts: str = ""
+    found: Explanation,
+    title: str,
+    tables: Sequence[Table] = (),
+    facts: str = "",
 ) -> Answer:
     """Of a log."""
-    first = found.first
-    odd = first is not None or found.unexplained
-    lost = any(spell.health >= LOST for spell in found.health.spells)
-    grade = "bad" if found.episodes or lost else "care" if odd else "good"
-    head = found.lines()[0]
+    verdict = found.verdict
     return Answer(
         title,
-        grade,
-        head[0].upper() + head[1:],
+        verdict.mark,
+        _sentence(verdict.words),
         facts,
-        lines=[*found.remarks, *found.setup],
+        lines=[*_why(verdict), _sentence(found.lines()[0]), *found.remarks, *found.setup],
+        changes=_settings(verdict),
         events=_events(found),
         tables=tables,
     )
+
+
+def _sentence(words: str) -> str:
+    return words[0].upper() + words[1:]
+
+
+def _why(verdict: Verdict) -> list[str]:
+    return [*verdict.doubts, *([NOISES] if verdict.noises else [])]
+
+
+def _settings(verdict: Verdict) -> list[str]:
+    return [f"{name} = {value}" for name, value in verdict.settings.items()]
 
 
 def _events(found: Explanation) -> list[Event]:
@@ -84,22 +106,21 @@ def of_comparison(
     pictures: Sequence[tuple[str, str, Path]],
     tables: Sequence[Table] = (),
 ) -> Answer:
-    """Of a report; `lines` are its verdicts, `tables` stand below that of the runs."""
+    """Of a report; `lines` are its remarks, `tables` stand below that of the runs."""
     from pelorus.report import words  # noqa: PLC0415 - it looks at runs, which load slowly
 
-    calm = not found.episodes and list(lines) == words.NOTHING_OFF
     meaning = MEANING + (ALSO if len(compared.runs) > 2 else "")
     rows = [words.titles(compared), *(words.row(compared, run) for run in compared.runs)]
     commands = [
         shlex.join((run.plan.program.name, "IN.plr", *run.plan.options)) for run in compared.runs
     ]
-    head = found.lines()[0]
     return Answer(
         f"Pelorus report: {compared.subject.title}",
-        "good" if calm else "bad" if found.episodes else "care",
-        head[0].upper() + head[1:],
+        found.verdict.mark,
+        _sentence(found.verdict.words),
         _facts(compared),
-        [*lines, *found.setup],
+        [*_why(found.verdict), _sentence(found.lines()[0]), *lines, *found.setup],
+        changes=_settings(found.verdict),
         events=_events(found),
         tables=[Table("Runs", rows, meaning), *tables],
         pictures=pictures,
@@ -120,6 +141,10 @@ def _facts(compared: Comparison) -> str:
     )
 
 
+def _remarks(found: Checked) -> list[str]:
+    return [f"{remark.mark}: {remark.text}" for remark in found.remarks]
+
+
 def of_check(found: Checked, title: str, found_in: Explanation | None) -> Answer:
     """Of a check; `found_in` explains the log of the settings that it proposes."""
     tuned = {} if found.tuned is None else found.tuned.settings
@@ -127,11 +152,15 @@ def of_check(found: Checked, title: str, found_in: Explanation | None) -> Answer
     rows = [("", "before", "after"), *found.rows]
     return Answer(
         f"Pelorus check: {title}",
-        GRADES[found.grade],
-        found.verdict[0].upper() + found.verdict[1:],
-        lines=[*(remark.text for remark in found.remarks), *found.changes],
+        found.verdict.mark,
+        _sentence(found.verdict.words),
+        found.was,
+        lines=[*found.verdict.doubts, *found.changes],
         changes=settings,
         events=[] if found_in is None else _events(found_in),
         tables=[Table("Before and after", rows)] if found.rows else [],
-        lists=[("Health", ["with these settings", *found.spells])] if found.spells else [],
+        lists=[
+            *([("Health", ["with these settings", *found.spells])] if found.spells else []),
+            ("All remarks", ["what was looked at", *_remarks(found)]),
+        ],
     )

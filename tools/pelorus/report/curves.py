@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from pelorus import schema
@@ -22,7 +23,7 @@ from pelorus.evidence import Evidence
 from pelorus.frame_table import FrameTable, frame_table
 from pelorus.frames import Message, Truth, TruthKnows
 from pelorus.grid.plane import AXES, choose
-from pelorus.health import GOOD, SHORT
+from pelorus.health import GOOD, NOT_STARTED, SHORT
 from pelorus.layout import Floats, stacked
 from pelorus.motion import Times, nearest
 from pelorus.report.landmarks import WHY, Landmarks, packed
@@ -36,6 +37,7 @@ FRAMES_MOST = 150_000  # two hours at 20 Hz
 BESIDE = "beside"  # what curves of another log are called
 NO_HEALTH = 255
 NOTHING = "Nothing to draw: in no frame of this log is it known and not zero."
+TURNS = ("roll", "pitch", "yaw")
 SHAPES = 200  # ellipsoids along the way
 INSIDE = (
     "In body axes, first poses aligned, and three sigma of the filter's own covariance: an honest "
@@ -102,7 +104,7 @@ class Curves:
         """All of it but the columns."""
         return {
             "t": self.packer.add_exactly(np.round(self._t * 1e3), "u4"),  # ms
-            "health": self.packer.add_exactly(self._frames["health"], "u1"),
+            "health": self.packer.add_exactly(_shown_health(self._frames), "u1"),
             "reasons": self.packer.add_exactly(self._frames.reasons, "u4"),
             "status": self.packer.add_exactly(self._frames["status"] + 128, "u1"),
             **self._health_beside(),
@@ -117,7 +119,7 @@ class Curves:
     def _health_beside(self) -> dict[str, Any]:
         if self._beside is None:
             return {}
-        there = self._at_own(self._beside, self._beside._frames["health"])
+        there = self._at_own(self._beside, _shown_health(self._beside._frames))
         known = np.where(np.isnan(there), NO_HEALTH, there)
         return {"health_beside": self.packer.add_exactly(known, "u1")}
 
@@ -125,6 +127,7 @@ class Curves:
 
     def _charts(self) -> Iterator[dict[str, Any]]:
         yield from self._errors()
+        yield from self._motion()
         yield self._innovations()
         yield from self._biases()
         yield from self._observations()
@@ -228,6 +231,19 @@ class Curves:
         same = t_ns[order][at] == self._frames.t_ns
         out[same] = values[order[at[same]]]
         return out
+
+    def _motion(self) -> Iterator[dict[str, Any]]:
+        """How the body goes and how it is turned, beside the truth where there is one."""
+        frames = self._frames
+        v = [(axis, frames[f"v{axis}_mps"]) for axis in AXES]
+        yield self._chart("Velocity", "m/s", "Of the body, along its own axes.", v)
+        lines = list(zip(TURNS, _turns_deg(frames.stack("qx", "qy", "qz", "qw")).T, strict=True))
+        about = "Of the body in the world: about its x, y and z axes, the last one first."
+        if self.accuracy is not None:
+            true = _turns_deg(Rotation.from_matrix(self.accuracy.truth.R).as_quat())
+            true = self._spread(self.accuracy.t_ns, true)
+            lines += [(f"{name} true", true[:, k]) for k, name in enumerate(TURNS)]
+        yield self._chart("Roll, pitch, yaw", "deg", about, lines)
 
     def _innovations(self) -> dict[str, Any]:
         dof = self._frames["nis_dof"]
@@ -390,6 +406,22 @@ class Curves:
 _PARTS = (slice(0, 3), slice(3, 6))
 
 
+def _shown_health(frames: FrameTable) -> Floats:
+    """As told; what waits for its start has lost nothing yet."""
+    begun = np.logical_or.accumulate(frames.reasons & NOT_STARTED == 0)
+    return np.where(begun, frames["health"], len(schema.HEALTHS))
+
+
+def _turns_deg(quaternion: Floats) -> Floats:
+    """(n, 3) roll, pitch and yaw; NaN where there is none."""
+    out = np.full((len(quaternion), 3), np.nan)
+    known = np.isfinite(quaternion).all(axis=1)
+    if known.any():
+        turned = Rotation.from_quat(quaternion[known]).as_euler("ZYX", degrees=True)
+        out[known] = turned[:, ::-1]
+    return out
+
+
 def _words() -> dict[str, Any]:
     reasons = {
         str(bit.bit_length() - 1): SHORT.get(name, schema.REASONS[bit])
@@ -397,7 +429,7 @@ def _words() -> dict[str, Any]:
     }
     harmless = [k for k in range(32) if schema.LIMITS["harmless_reasons"] >> k & 1]
     return {
-        "health": list(schema.HEALTHS.values()),
+        "health": [*schema.HEALTHS.values(), "not started"],
         "reasons": reasons,
         "harmless": harmless,
         "status": {str(k): words.partition(":")[0] for k, words in schema.STATUSES.items()},

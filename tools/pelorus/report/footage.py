@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
-from pelorus.evaluation import made_in
 from pelorus.explain.explanation import Explanation
 from pelorus.explain.log import Log, log_of
 from pelorus.extras import extra
-from pelorus.frames import Message, Stereo
-from pelorus.layout import Floats
+from pelorus.frames import Message
 from pelorus.motion import Times, nearest
+from pelorus.report.residuals import residuals_of
 from pelorus.tracking import images
 from pelorus.tracking.images import Gray
 
@@ -36,13 +35,12 @@ WIDTH_PX = 560  # of a picture on the page
 QUALITY = 55  # of WebP: some 20 KB a picture
 TAIL_FRAMES = 5
 RESIDUAL_TIMES = 5.0  # by how much they are drawn longer
-RESIDUAL_MOST_PX = 20.0  # a longer one is another landmark's, or behind the camera
 GREEN, RED, ORANGE = (63, 208, 160), (255, 70, 40), (255, 190, 60)
 BAGS = (".bag", ".mcap", ".db3")
 CAPTION = (
     "Green: a point and its way through the last frames. Red: seen, and rejected. Orange, five "
-    "times as long: from the point to where the pose of the frame and the landmark as the filter "
-    "left it say that it should be."
+    "times as long: from the point to where the ten frames before and the pose of this one say "
+    "that it should be."
 )
 
 
@@ -81,7 +79,7 @@ def footage(
     """
     log = log_of(messages)
     wanted = moments(log, found)
-    artist = _Artist(log, messages)
+    artist = _Artist(log)
     with _opened(source, tuple(calibration)) as pictures:
         frame_of = _frames(pictures, log)
         chosen = {int(k): picture for picture, k in enumerate(frame_of) if k in wanted}
@@ -206,12 +204,10 @@ def _frames(source: _Source, log: Log) -> NDArray[np.int64]:
 
 
 class _Artist:
-    def __init__(self, log: Log, messages: Sequence[Message]) -> None:
+    def __init__(self, log: Log) -> None:
         self._log = log
-        self._landmarks = {m.id: m.p_W_m for m in made_in(messages)}
 
     def draw(self, picture: Gray, k: int, where: Path) -> bytes:
-        frame = self._log.frames[k]
         height, width = picture.shape
         header = self._log.header
         due = (header.image_width_px, header.image_height_px)
@@ -233,8 +229,9 @@ class _Artist:
             if len(points) > 1:
                 pen.line(points, fill=colour)
             _dot(pen, points[-1], colour)
-        for at, expected in self._residuals(k, frame):
-            end = at + RESIDUAL_TIMES * (expected - at)
+        found = residuals_of(self._log, k)
+        for at, off in zip(found.pixels[:, :2], found.off[:, :2], strict=True):
+            end = at - RESIDUAL_TIMES * off
             pen.line([tuple(at * scale), tuple(end * scale)], fill=ORANGE)
         packed = io.BytesIO()
         image.save(packed, "WEBP", quality=QUALITY)
@@ -252,23 +249,6 @@ class _Artist:
                 if id in ways and np.isfinite(at).all():
                     ways[id].append(at)
         return {id: way for id, way in ways.items() if way}
-
-    def _residuals(self, k: int, frame: Stereo) -> Iterator[tuple[Floats, Floats]]:
-        pose = self._log.poses[k]
-        known = [i for i, id in enumerate(frame.ids.tolist()) if id in self._landmarks]
-        if pose is None or not known:
-            return
-        header, camera = self._log.header, self._log.header.camera
-        p_W = np.array([self._landmarks[int(frame.ids[i])] for i in known])
-        q_B = (p_W - pose.p_WB_m) @ np.asarray(pose.R_WB)
-        x, y, z = (q_B @ np.asarray(header.R_CB).T + header.t_CB_m).T
-        z = np.where(z > 0, z, np.nan)
-        expected = np.stack(
-            (camera.fx_px * x / z + camera.cx_px, camera.fy_px * y / z + camera.cy_px), axis=-1
-        )
-        seen = frame.pixels[known, :2].astype(np.float64)
-        near = np.linalg.norm(expected - seen, axis=1) <= RESIDUAL_MOST_PX
-        yield from zip(seen[near], expected[near], strict=True)
 
 
 def _dot(pen: ImageDraw.ImageDraw, at: tuple[float, ...], colour: tuple[int, int, int]) -> None:

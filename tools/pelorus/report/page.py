@@ -47,6 +47,15 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Drawing:
+    """SVG, made by drawings.py."""
+
+    title: str
+    about: str
+    svg: str
+
+
+@dataclass(frozen=True)
 class Answer:
     """What stands above the curves. `grade` is one of GRADES."""
 
@@ -61,6 +70,7 @@ class Answer:
     pictures: Sequence[tuple[str, str, Path]] = ()  # title, caption, PNG
     moments: Sequence[tuple[float, str, bytes]] = ()  # s since the first frame, words, WebP
     about_moments: str = ""
+    drawings: Sequence[Drawing] = ()
     commands: Sequence[str] = ()
     lists: Sequence[tuple[str, Sequence[str]]] = ()  # to unfold: what stands before, and the rest
 
@@ -155,11 +165,20 @@ _KEYS = (
 
 
 def _below(answer: Answer, curves: Curves) -> list[str]:
-    out = [*_pictures(answer), f'<p class="soft">{escape(_KEYS)}</p>']
+    out = [f'<p class="soft">{escape(_KEYS)}</p>', *_drawings(answer), *_pictures(answer)]
     if curves.left_out:
         words = "; ".join(curves.left_out)
         out.append(f'<p class="soft">Left out, to keep the page small: {escape(words)}.</p>')
     return [*out, "</main>", *_commands(answer)]
+
+
+def _drawings(answer: Answer) -> list[str]:
+    made = [
+        f"<section><h2>{escape(one.title)}</h2>{one.svg}\n"
+        f'<p class="soft">{escape(one.about)}</p></section>'
+        for one in answer.drawings
+    ]
+    return ['<div class="drawings">', *made, "</div>"] if made else []
 
 
 def _moments(answer: Answer) -> str:

@@ -13,7 +13,7 @@ from pelorus.frames import OBSERVATIONS_MAX
 class Settings:
     """Lengths in px."""
 
-    corners: int = 120  # at most so many tracks in a frame
+    corners: int = 100  # at most so many tracks in a frame: the filter's slots
     spacing_px: float = 20.0  # between two new corners, and to the tracks that are there
     window_px: int = 15  # side of the patch that is followed
     round_trip_px: float = 0.5  # there and back again, a point may miss its start by so much

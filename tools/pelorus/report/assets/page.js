@@ -52,7 +52,7 @@
 
   // --- what a frame says -------------------------------------------------------------------------
 
-  const COLOURS = ["--good", "--degraded", "--lost", "--diverged"];
+  const COLOURS = ["--good", "--degraded", "--lost", "--diverged", "--waits"];
   const harmless = new Set(data.words.harmless);
   const said = (k) => {
     const out = [];
