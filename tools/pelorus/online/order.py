@@ -3,7 +3,8 @@
 
 A message's turn comes when nothing earlier is expected: both the motion sensor and the camera have
 sent something at least as new, or something newer by `patience` has come, so that a dead sensor
-stops nobody. There is no clock in here: time is what the stamps say.
+stops nobody. There is no clock in here: time is what the stamps say, and whether they have jumped
+says the motion sensor, which sends the most: a camera that is far off is late, or has another clock.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from pelorus.frames import Imu, Reading, Stereo, Twist
 
 Datum = Imu | Twist | Reading | Stereo
 
-RANKS: dict[type[Datum], int] = {Imu: 0, Twist: 0, Reading: 1, Stereo: 2}
+MOTION = 0
+RANKS: dict[type[Datum], int] = {Imu: MOTION, Twist: MOTION, Reading: 1, Stereo: 2}
 AGREEING = 3  # so many stamps in a row make a step of the clock; one or two are outliers
 WAITING_MAX = 4096
 
@@ -54,12 +56,12 @@ class Sequencer:
 
     def add(self, datum: Datum) -> list[Datum | ClockStep]:
         """Returns the messages whose turn has come, in order."""
-        t_ns = datum.t_ns
-        newest = max(self._newest.values(), default=t_ns)
-        if abs(t_ns - newest) > self.gap_ns:
+        newest = self._newest.get(False, max(self._newest.values(), default=datum.t_ns))
+        if abs(datum.t_ns - newest) > self.gap_ns:
             return self._far(datum, newest)
-        self.counts.off_clock += len(self._off)
-        self._off = []
+        if RANKS[type(datum)] == MOTION:
+            self.counts.off_clock += len(self._off)
+            self._off = []
         self._keep(datum)
         return list(self._due())
 
@@ -71,6 +73,9 @@ class Sequencer:
 
     def _far(self, datum: Datum, newest: int) -> list[Datum | ClockStep]:
         self.off_by_ns = datum.t_ns - newest
+        if RANKS[type(datum)] != MOTION:
+            self.counts.off_clock += 1
+            return []
         if self._off and not 0 < datum.t_ns - self._off[-1].t_ns <= self.gap_ns:
             self.counts.off_clock += len(self._off)
             self._off = []

@@ -62,10 +62,17 @@ def of_health(health: int, reasons: int, values: dict[str, str] | None = None) -
     """Returns health in words, why, and what to do about the first cause."""
     bits = [1 << k for k in range(reasons.bit_length()) if reasons >> k & 1]
     names = [schema.REASON_NAMES.get(bit, f"reason {bit}") for bit in bits]
-    causes = sorted(names, key=lambda name: name in ("POSE_MAY_BE_WRONG", "FEW_OBSERVATIONS"))
+    causes = sorted(names, key=_place)
     why = ", ".join(SHORT.get(name, name.lower().replace("_", " ")) for name in causes)
     word = schema.HEALTHS.get(health, str(health))
     told = f"{word}: {why}" if why and health != GOOD else word
     do = next((ADVICE[name] for name in causes if name in ADVICE), "") if health != GOOD else ""
     more = {"health": word, "reasons": " ".join(names)}
     return Status("estimate", LEVELS.get(health, Level.ERROR), told, do, more | (values or {}))
+
+
+def _place(name: str) -> int:
+    """What explains the others comes first."""
+    if name in ("POSE_MAY_BE_WRONG", "FEW_OBSERVATIONS", "NO_OBSERVATIONS"):
+        return 2
+    return 0 if name in ("NOT_STARTED", "NO_FRAMES", "NO_TWISTS", "IMU_FAULT") else 1

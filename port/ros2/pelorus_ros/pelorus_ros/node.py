@@ -42,10 +42,10 @@ from pelorus_ros.diagnosis import Level, Status
 from pelorus_ros.estimator import SIDES, Estimator
 from pelorus_ros.parameters import Options, misspelt, table
 
-PICTURES_WAITING = 6  # of both cameras: three pairs; then a pair is left out
-READINGS_KEPT = 1000  # of an IMU's topic, by the middleware
+PICTURES_KEPT, READINGS_KEPT = 30, 1000  # of a topic, by the middleware
 LATENCIES_KEPT = 600
 LANDMARKS_EVERY_NS = 200_000_000
+SWITCH_S = 0.0005  # the executor takes what has come while a picture is followed
 ENDED = object()
 
 
@@ -78,8 +78,10 @@ class PelorusNode(Node):
         self._lock = threading.Lock()
         self._queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._pictures_waiting = 0
+        self._pictures_most = 0 if self.options is None else 2 * self.options.pairs_waiting
         self._latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)
         self._inputs: dict[str, str] = {}  # topic as resolved: type
+        self._asked: dict[str, str] = {}  # topic as resolved: as asked for
         self._landmarks_ns = -1
         self._path = PathMessage()
         self._said: dict[str, str] = {}
@@ -115,7 +117,14 @@ class PelorusNode(Node):
 
     def _complain(self, words: str, level: Level = Level.ERROR) -> None:
         self._complaints.append(Status("parameters", level, words, "correct it and start the node again"))
-        (self.get_logger().error if level is Level.ERROR else self.get_logger().warning)(words)
+        self._log(level, words)
+
+    def _log(self, level: Level, words: str) -> None:
+        logger = self.get_logger()
+        if level is Level.ERROR:
+            logger.error(words)
+        else:
+            logger.warning(words)
 
     # --- what comes
 
@@ -152,7 +161,7 @@ class PelorusNode(Node):
     def _listen_pictures(self, side: str, options: Options, e: Estimator) -> None:
         packed = options.image_transport == "compressed"
         topic = f"{side}/image/compressed" if packed else f"{side}/image"
-        profile = qos(10, reliable=options.image_qos == "reliable")
+        profile = qos(PICTURES_KEPT, reliable=options.image_qos == "reliable")
         callback = partial(self._arrived, partial(e.picture, side), True)
         self._subscribe(topic, CompressedImage if packed else Image, callback, profile)
 
@@ -161,8 +170,9 @@ class PelorusNode(Node):
 
     def _subscribe(self, topic: str, kind: Any, callback: Any, profile: QoSProfile) -> None:
         made = self.create_subscription(kind, topic, callback, profile)
-        package, _, name = kind.__module__.partition(".msg")
+        package, _, _ = kind.__module__.partition(".msg")
         self._inputs[made.topic_name] = f"{package}/msg/{kind.__name__}"
+        self._asked[made.topic_name] = topic
 
     def _listen_typed(self, topic: str, name: str, use: Callable[..., list[Odom]]) -> None:
         kind = self._type(name)
@@ -203,7 +213,7 @@ class PelorusNode(Node):
         if not arrival.is_picture:
             return arrival.use(arrival.message)
         self._pictures_waiting -= 1
-        return arrival.use(arrival.message, too_slow=self._pictures_waiting > PICTURES_WAITING)
+        return arrival.use(arrival.message, too_slow=self._pictures_waiting > self._pictures_most)
 
     def end(self) -> None:
         """Lets the thread come to its end, and closes the log."""
@@ -320,7 +330,7 @@ class PelorusNode(Node):
         for one in found:
             if one.name in bad and self._said.get(one.name, "").split(" (")[0] != one.message.split(" (")[0]:
                 words = f"{one.name}: {one.message}" + (f"; {one.do}" if one.do else "")
-                (self.get_logger().error if one.level is Level.ERROR else self.get_logger().warning)(words)
+                self._log(one.level, words)
         self._said = bad
 
     def _of_graph(self) -> list[Status]:
@@ -333,11 +343,11 @@ class PelorusNode(Node):
             if types and kind not in types:
                 words = f"{topic} is a {' and a '.join(sorted(types))}; {kind} is expected"
                 found.append(Status("types", Level.ERROR, words, "remap the topic, or set image_transport, tracks_type or wheels_type"))
-            wanted = any(topic.startswith(self.resolve_topic_name(one)) for one in self.estimator.topics())
+            wanted = self._asked[topic].removesuffix("/compressed") in self.estimator.topics()
             if not types and wanted:
                 there = [name for name, kinds in self.get_topic_names_and_types() if kind in kinds and name != topic]
                 others = f"; of that type there are {', '.join(sorted(there)[:8])}" if there else "; there is none of its type"
-                found.append(Status("topics", Level.ERROR, f"nobody publishes {topic} ({kind}){others}", f"start the driver, or remap: --ros-args -r {topic.rsplit('/', 1)[-1]}:=NAME"))
+                found.append(Status("topics", Level.ERROR, f"nobody publishes {topic} ({kind}){others}", f"start the driver, or remap: --ros-args -r {self._asked[topic]}:=NAME"))
         return found
 
     def _of_latency(self) -> Status:
@@ -356,6 +366,7 @@ def _fill(place: Any, turn: Any, odom: Odom) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Runs the node until Ctrl-C or SIGTERM."""
     rclpy.init(args=sys.argv if arguments is None else arguments)
+    sys.setswitchinterval(SWITCH_S)
     node = PelorusNode()
     try:
         rclpy.spin(node)

@@ -80,6 +80,9 @@ class Options:
     gyro_scale: float = _of(1.0, "to rad/s: 0.0174533 for an IMU that tells degrees")
     image_transport: str = _of("raw", "raw, or compressed (topic image/compressed)", TRANSPORTS)
     image_qos: str = _of("sensor_data", "of pictures: sensor_data (best effort) or reliable", QOS)
+    pairs_waiting: int = _of(
+        3, "pairs of pictures that may wait to be followed; of more the new ones are left out"
+    )
     settings: list[str] = _of(
         [""], "settings of the filter, name=value as pelorus-replay has them: pixel-sigma=1"
     )
