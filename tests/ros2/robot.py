@@ -21,6 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from pelorus_msgs.msg import StereoTracks
+from pelorus_ros.conventions import quaternion
 from pelorus_ros.node import qos
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import CameraInfo, Image, Imu
@@ -42,10 +43,12 @@ class Played:
 
 
 def stamped(t_ns: int, frame: str) -> Header:
+    """Returns a header."""
     return Header(stamp=Time(sec=t_ns // 10**9, nanosec=t_ns % 10**9), frame_id=frame)
 
 
 def imu_message(t_ns: int, a: Sequence[float], w: Sequence[float], frame: str = "imu") -> Imu:
+    """Returns a reading."""
     return Imu(
         header=stamped(t_ns, frame),
         linear_acceleration=Vector3(**dict(zip("xyz", map(float, a), strict=True))),
@@ -54,6 +57,7 @@ def imu_message(t_ns: int, a: Sequence[float], w: Sequence[float], frame: str = 
 
 
 def image_message(t_ns: int, pixels: np.ndarray[Any, Any], frame: str) -> Image:
+    """Returns a grey picture."""
     message = Image(header=stamped(t_ns, frame), encoding="mono8")
     message.height, message.width = pixels.shape
     message.step = message.width
@@ -62,13 +66,23 @@ def image_message(t_ns: int, pixels: np.ndarray[Any, Any], frame: str) -> Image:
 
 
 def tracks_message(t_ns: int, ids: Any, pixels: Any, frame: str = "left_optical") -> StereoTracks:
-    sides = dict(zip(("left_u", "left_v", "right_u", "right_v"), np.asarray(pixels, np.float32).T, strict=True))
+    """Returns the tracks of a frame."""
+    sides = dict(
+        zip(
+            ("left_u", "left_v", "right_u", "right_v"),
+            np.asarray(pixels, np.float32).T,
+            strict=True,
+        )
+    )
     return StereoTracks(
-        header=stamped(t_ns, frame), id=np.asarray(ids, np.uint32), **{k: v.copy() for k, v in sides.items()}
+        header=stamped(t_ns, frame),
+        id=np.asarray(ids, np.uint32),
+        **{k: v.copy() for k, v in sides.items()},
     )
 
 
 def info_message(camera: Any, size: tuple[int, int], is_right: bool, frame: str) -> CameraInfo:
+    """Returns the camera_info of a rectified camera."""
     message = CameraInfo(header=stamped(0, frame), width=size[0], height=size[1])
     message.distortion_model = "plumb_bob"
     message.d = [0.0] * 5
@@ -83,8 +97,7 @@ def info_message(camera: Any, size: tuple[int, int], is_right: bool, frame: str)
 
 
 def transform_message(parent: str, child: str, R: Any, p: Any) -> TransformStamped:
-    from pelorus_ros.conventions import quaternion
-
+    """Returns a transform of /tf_static."""
     message = TransformStamped(header=stamped(0, parent), child_frame_id=child)
     t, q = message.transform.translation, message.transform.rotation
     t.x, t.y, t.z = map(float, p)
@@ -93,9 +106,15 @@ def transform_message(parent: str, child: str, R: Any, p: Any) -> TransformStamp
 
 
 class Robot:
-    """The node as a process, with everything that it says collected. `namespace` keeps two apart."""
+    """The node as a process, and all that it says. `namespace` keeps two apart."""
 
-    def __init__(self, folder: Path, parameters: dict[str, Any], namespace: str = "/", remap: dict[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        parameters: dict[str, Any],
+        namespace: str = "/",
+        remap: dict[str, str] | None = None,
+    ) -> None:
         self.namespace = namespace.rstrip("/")
         given = [f"-p{name}:={_yaml(value)}" for name, value in parameters.items()]
         options = [word for one in given for word in ("-p", one[2:])]
@@ -103,7 +122,8 @@ class Robot:
             options += ["-r", f"{source}:={target}"]
         self._errors = (folder / f"node{self.namespace.replace('/', '-')}.txt").open("wb+")
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "pelorus_ros.node", "--ros-args", "-r", f"__ns:={namespace}", *options],
+            [sys.executable, "-m", "pelorus_ros.node", "--ros-args", "-r", f"__ns:={namespace}",
+             *options],
             stdout=self._errors, stderr=subprocess.STDOUT, env=os.environ.copy(),
         )  # fmt: skip
         self.context = rclpy.Context()
@@ -116,8 +136,15 @@ class Robot:
         self.tf: list[TransformStamped] = []
         self.said: list[Any] = []
         self.node.create_subscription(Odometry, "odom", self._take, qos(1000, reliable=True))
-        self.node.create_subscription(TFMessage, "/tf", lambda m: self.tf.extend(m.transforms), qos(1000, reliable=True))
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", lambda m: self.said.extend(m.status), qos(100, reliable=True))
+        self.node.create_subscription(
+            TFMessage, "/tf", lambda m: self.tf.extend(m.transforms), qos(1000, reliable=True)
+        )
+        self.node.create_subscription(
+            DiagnosticArray,
+            "/diagnostics",
+            lambda m: self.said.extend(m.status),
+            qos(100, reliable=True),
+        )
         self._publishers: dict[str, Any] = {}
 
     def _take(self, message: Odometry) -> None:
@@ -127,7 +154,12 @@ class Robot:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.stop()
         self.executor.shutdown()
         self.node.destroy_node()
@@ -149,7 +181,9 @@ class Robot:
     def publisher(self, topic: str, kind: Any, latched: bool = False) -> Any:
         if topic not in self._publishers:
             depth = 1 if latched else 5000
-            self._publishers[topic] = self.node.create_publisher(kind, topic, qos(depth, True, latched))
+            self._publishers[topic] = self.node.create_publisher(
+                kind, topic, qos(depth, True, latched)
+            )
         return self._publishers[topic]
 
     def until(self, done: Callable[[], bool], what: str) -> None:
@@ -159,24 +193,33 @@ class Robot:
             if time.monotonic() > limit:
                 self._errors.seek(0)
                 said = "\n".join(sorted({f"{s.name}: {s.message}" for s in self.said}))
-                raise AssertionError(f"no {what}\n{said}\n{self._errors.read().decode(errors='replace')[-3000:]}")
+                raise AssertionError(
+                    f"no {what}\n{said}\n{self._errors.read().decode(errors='replace')[-3000:]}"
+                )
             if self.process.poll() is not None:
                 self._errors.seek(0)
-                raise AssertionError("the node has ended:\n" + self._errors.read().decode(errors="replace"))
+                raise AssertionError(
+                    "the node has ended:\n" + self._errors.read().decode(errors="replace")
+                )
             self.executor.spin_once(timeout_sec=0.05)
 
     def heard(self, topics: Iterable[str]) -> None:
         """Waits until the node listens to these topics."""
         for topic in topics:
-            self.until(lambda topic=topic: self._publishers[topic].get_subscription_count() > 0, f"subscription of {topic}")
+            self.until(
+                lambda topic=topic: self._publishers[topic].get_subscription_count() > 0,
+                f"subscription of {topic}",
+            )
 
     def listened(self) -> None:
         """Waits until the node's odometry is heard here."""
-        self.until(lambda: self.node.count_publishers(f"{self.namespace}/odom") > 0, "publisher of odom")
+        self.until(
+            lambda: self.node.count_publishers(f"{self.namespace}/odom") > 0, "publisher of odom"
+        )
         self.until(lambda: len(self.said) > 0, "diagnostics")
 
     def play(self, messages: Iterable[Played], rate: float = 1.0) -> None:
-        """Publishes them at the pace of their arrivals, `rate` times as fast; 0: as fast as it goes."""
+        """Publishes them at `rate` times the pace of their arrivals; 0: as fast as it goes."""
         first_ns, begun = None, time.monotonic()
         for k, one in enumerate(sorted(messages)):
             first_ns = one.arrives_ns if first_ns is None else first_ns

@@ -10,7 +10,7 @@ NAME = "pelorus_ros"
 setup(
     name=NAME,
     version="0.1.0",
-    description="Stereo visual-inertial odometry with an honest covariance: Pelorus as a ROS 2 node",
+    description="Stereo visual-inertial odometry with an honest covariance, as a node",
     license="MIT",
     packages=[NAME],
     package_data={NAME: ["py.typed"]},

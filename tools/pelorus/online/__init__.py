@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The filter on a robot: data as they come, in any order, to estimates and a log. No ROS in here."""
+"""The filter on a robot: data as they come, in any order, to estimates and a log."""

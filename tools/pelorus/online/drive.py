@@ -15,7 +15,6 @@ import numpy as np
 
 from pelorus import packed_file, schema
 from pelorus.configured import Configured, Named
-from pelorus.errors import PelorusError
 from pelorus.filter import Filter, FilterError, observations
 from pelorus.frames import (
     UNKNOWN_VARIANCE,
@@ -167,7 +166,9 @@ class Drive:
                 sensor = SENSOR_NAMES[datum.sensor]
                 f.measure(datum.t_ns, sensor, datum.value, datum.sigma, datum.at_B_m)
             case Stereo():
-                return self._answered(datum, f.update(datum.t_ns, observations(datum.ids, datum.pixels)))
+                return self._answered(
+                    datum, f.update(datum.t_ns, observations(datum.ids, datum.pixels))
+                )
         return None
 
     def place(self, start: Start) -> None:
@@ -191,7 +192,7 @@ class Drive:
         return totals["resets"] + totals["widened"]
 
     def estimate(self, report: FrameReport | None = None) -> Estimate:
-        """Returns what is known at the filter's time; a covariance that is not known is enormous."""
+        """Returns what is known at the filter's time; an unknown covariance is enormous."""
         f = self.filter
         health = f.health()
         try:

@@ -41,7 +41,9 @@ class OpenCvEyes:
     of another calibration, or not taken together.
     """
 
-    def __init__(self, rectification: Rectification | None, settings: Settings | None = None) -> None:
+    def __init__(
+        self, rectification: Rectification | None, settings: Settings | None = None
+    ) -> None:
         self._rectification = rectification
         self._tracker = Tracker(settings or Settings())
         self._evidence = Evidence(self._tracker.settings)

@@ -180,7 +180,9 @@ class Odometry:
         self.drives += 1
         path = self._log
         if path is not None and self.drives > 1:
-            suffix = "".join(path.suffixes[-2:] if packed_file.is_packed(path) else path.suffixes[-1:])
+            suffix = "".join(
+                path.suffixes[-2:] if packed_file.is_packed(path) else path.suffixes[-1:]
+            )
             path = path.with_name(f"{packed_file.bare_name(path)}-{self.drives}{suffix}")
         return Drive(self.setup, start, path)
 

@@ -3,8 +3,8 @@
 
 A message's turn comes when nothing earlier is expected: both the motion sensor and the camera have
 sent something at least as new, or something newer by `patience` has come, so that a dead sensor
-stops nobody. There is no clock in here: time is what the stamps say, and whether they have jumped
-says the motion sensor, which sends the most: a camera that is far off is late, or has another clock.
+stops nobody. There is no clock in here: time is what the stamps say, and whether they have
+jumped says the motion sensor, which sends most: a camera far off is late, or has another clock.
 """
 
 from __future__ import annotations
@@ -93,7 +93,9 @@ class Sequencer:
 
     def _keep(self, datum: Datum) -> None:
         key = datum.t_ns, RANKS[type(datum)]
-        twice = any(key == (t, rank) for t, rank, _, _ in self._waiting) and key[1] != RANKS[Reading]
+        twice = (
+            any(key == (t, rank) for t, rank, _, _ in self._waiting) and key[1] != RANKS[Reading]
+        )
         if key <= self._released or twice:
             self.counts.late += 1
             self.late_by_ns = self._released[0] - datum.t_ns

@@ -53,7 +53,7 @@ class Pairing(Generic[Item]):
         other.remove(nearest)
         self.paired += 1
         self._gaps_ns.append(abs(nearest[0] - t_ns))
-        left, right = ((nearest, (t_ns, item)) if is_right else ((t_ns, item), nearest))
+        left, right = (nearest, (t_ns, item)) if is_right else ((t_ns, item), nearest)
         return Pair(left[0], left[1], right[1])
 
     def _let_go(

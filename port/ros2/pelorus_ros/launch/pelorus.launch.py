@@ -36,8 +36,6 @@ def generate_launch_description() -> LaunchDescription:
             LaunchConfiguration("params"),
             {"use_sim_time": LaunchConfiguration("use_sim_time")},
         ],
-        remappings=[
-            (topic, LaunchConfiguration(name)) for name, (topic, _) in TOPICS.items()
-        ],
+        remappings=[(topic, LaunchConfiguration(name)) for name, (topic, _) in TOPICS.items()],
     )
     return LaunchDescription([*arguments, node])

@@ -38,9 +38,10 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from pelorus_ros import conventions
-from pelorus_ros.diagnosis import Level, Status
-from pelorus_ros.estimator import SIDES, Estimator
+from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options, misspelt, table
+from pelorus_ros.rigging import SIDES
+from pelorus_ros.status import Level, Status
 
 PICTURES_KEPT, READINGS_KEPT = 30, 1000  # of a topic, by the middleware
 LATENCIES_KEPT = 600
@@ -108,7 +109,11 @@ class PelorusNode(Node):
             self._complain(words, Level.WARN)
         if any(one.level is Level.ERROR for one in self._complaints):
             return None
-        lists = {name: list(value) for name, value in values.items() if isinstance(value, Sequence) and not isinstance(value, str)}
+        lists = {
+            name: list(value)
+            for name, value in values.items()
+            if isinstance(value, Sequence) and not isinstance(value, str)
+        }
         try:
             return Options.of(values | lists)
         except PelorusError as error:
@@ -116,7 +121,9 @@ class PelorusNode(Node):
             return None
 
     def _complain(self, words: str, level: Level = Level.ERROR) -> None:
-        self._complaints.append(Status("parameters", level, words, "correct it and start the node again"))
+        self._complaints.append(
+            Status("parameters", level, words, "correct it and start the node again")
+        )
         self._log(level, words)
 
     def _log(self, level: Level, words: str) -> None:
@@ -156,7 +163,9 @@ class PelorusNode(Node):
         TFMessage = self._type("tf2_msgs/msg/TFMessage")
         if TFMessage is not None:
             static = qos(100, reliable=True, latched=True)
-            self.create_subscription(TFMessage, "/tf_static", partial(self._arrived, e.transforms, False), static)
+            self.create_subscription(
+                TFMessage, "/tf_static", partial(self._arrived, e.transforms, False), static
+            )
 
     def _listen_pictures(self, side: str, options: Options, e: Estimator) -> None:
         packed = options.image_transport == "compressed"
@@ -185,7 +194,9 @@ class PelorusNode(Node):
         try:
             return getattr(importlib.import_module(f"{package}.msg"), kind)
         except (ImportError, AttributeError):
-            self._complain(f"the message {name} is not installed: build or source the package {package}")
+            self._complain(
+                f"the message {name} is not installed: build or source the package {package}"
+            )
             return None
 
     def _arrived(self, use: Callable[..., list[Odom]], is_picture: bool, message: Any) -> None:
@@ -201,7 +212,7 @@ class PelorusNode(Node):
                     told = self._used(arrival)
                 for odom in told:
                     self._publish(odom)
-            except Exception as error:  # noqa: BLE001 - the node stays up, and says what it was
+            except Exception as error:
                 if not rclpy.ok(context=self.context):
                     return
                 self.get_logger().error(f"{type(error).__name__}: {error}", throttle_duration_sec=5)
@@ -244,7 +255,9 @@ class PelorusNode(Node):
         self._odometry_out = self.create_publisher(OdometryMessage, "odom", qos(10, reliable=True))
         self._path_out = self.create_publisher(PathMessage, "path", qos(1, reliable=True))
         self._landmarks_out = self.create_publisher(PointCloud2, "landmarks", qos(1, reliable=True))
-        self._diagnostics_out = self.create_publisher(DiagnosticArray, "/diagnostics", qos(10, reliable=True))
+        self._diagnostics_out = self.create_publisher(
+            DiagnosticArray, "/diagnostics", qos(10, reliable=True)
+        )
         self._tf_out = None
         if self.options is not None and self.options.publish_odom_to_base_tf:
             TFMessage = self._type("tf2_msgs/msg/TFMessage")
@@ -252,8 +265,11 @@ class PelorusNode(Node):
                 self._tf_out = self.create_publisher(TFMessage, "/tf", qos(100, reliable=True))
 
     def _publish(self, odom: Odom) -> None:
-        assert self.options is not None and self.estimator is not None
-        header = Header(stamp=Time(nanoseconds=odom.t_ns).to_msg(), frame_id=self.options.odom_frame)
+        assert self.options is not None
+        assert self.estimator is not None
+        header = Header(
+            stamp=Time(nanoseconds=odom.t_ns).to_msg(), frame_id=self.options.odom_frame
+        )
         child = self.estimator.child_frame
         message = OdometryMessage(header=header, child_frame_id=child)
         _fill(message.pose.pose.position, message.pose.pose.orientation, odom)
@@ -307,7 +323,9 @@ class PelorusNode(Node):
             found += self._of_graph()
             found.append(self._of_latency())
         else:
-            found.append(Status("estimate", Level.ERROR, "the node waits: its parameters are wrong"))
+            found.append(
+                Status("estimate", Level.ERROR, "the node waits: its parameters are wrong")
+            )
         array = DiagnosticArray()
         array.header.stamp = self.get_clock().now().to_msg()
         array.status = [self._as_message(one) for one in found]
@@ -328,7 +346,10 @@ class PelorusNode(Node):
         """To the log what has changed, once."""
         bad = {one.name: one.message for one in found if one.level in (Level.WARN, Level.ERROR)}
         for one in found:
-            if one.name in bad and self._said.get(one.name, "").split(" (")[0] != one.message.split(" (")[0]:
+            if (
+                one.name in bad
+                and self._said.get(one.name, "").split(" (")[0] != one.message.split(" (")[0]
+            ):
                 words = f"{one.name}: {one.message}" + (f"; {one.do}" if one.do else "")
                 self._log(one.level, words)
         self._said = bad
@@ -342,12 +363,34 @@ class PelorusNode(Node):
             types = {one.topic_type for one in about}
             if types and kind not in types:
                 words = f"{topic} is a {' and a '.join(sorted(types))}; {kind} is expected"
-                found.append(Status("types", Level.ERROR, words, "remap the topic, or set image_transport, tracks_type or wheels_type"))
+                found.append(
+                    Status(
+                        "types",
+                        Level.ERROR,
+                        words,
+                        "remap the topic, or set image_transport, tracks_type or wheels_type",
+                    )
+                )
             wanted = self._asked[topic].removesuffix("/compressed") in self.estimator.topics()
             if not types and wanted:
-                there = [name for name, kinds in self.get_topic_names_and_types() if kind in kinds and name != topic]
-                others = f"; of that type there are {', '.join(sorted(there)[:8])}" if there else "; there is none of its type"
-                found.append(Status("topics", Level.ERROR, f"nobody publishes {topic} ({kind}){others}", f"start the driver, or remap: --ros-args -r {self._asked[topic]}:=NAME"))
+                there = [
+                    name
+                    for name, kinds in self.get_topic_names_and_types()
+                    if kind in kinds and name != topic
+                ]
+                others = (
+                    f"; of that type there are {', '.join(sorted(there)[:8])}"
+                    if there
+                    else "; there is none of its type"
+                )
+                found.append(
+                    Status(
+                        "topics",
+                        Level.ERROR,
+                        f"nobody publishes {topic} ({kind}){others}",
+                        f"start the driver, or remap: --ros-args -r {self._asked[topic]}:=NAME",
+                    )
+                )
         return found
 
     def _of_latency(self) -> Status:
@@ -355,7 +398,12 @@ class PelorusNode(Node):
             return Status("latency", Level.OK, "nothing measured yet")
         median, p99 = np.percentile(np.array(self._latencies_s) * 1e3, [50, 99])
         values = {"median ms": f"{median:.1f}", "p99 ms": f"{p99:.1f}"}
-        return Status("latency", Level.OK, f"from picture to odometry {median:.1f} ms, p99 {p99:.1f} ms", values=values)
+        return Status(
+            "latency",
+            Level.OK,
+            f"from picture to odometry {median:.1f} ms, p99 {p99:.1f} ms",
+            values=values,
+        )
 
 
 def _fill(place: Any, turn: Any, odom: Odom) -> None:

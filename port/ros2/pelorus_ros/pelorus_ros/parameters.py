@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The node's parameters: names, defaults and what they mean. rclpy declares them from this table."""
+"""The node's parameters: names, defaults and what they mean. rclpy declares them from here."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TRACKS = (
 )
 
 
-def _of(default: Any, about: str, choices: tuple[str, ...] = ()) -> Any:
+def parameter(default: Any, about: str, choices: tuple[str, ...] = ()) -> Any:
     """A field of Options: a list is copied, for defaults are shared."""
     more = {"about": about, "choices": choices}
     if isinstance(default, list):
@@ -36,67 +36,73 @@ def _of(default: Any, about: str, choices: tuple[str, ...] = ()) -> Any:
 class Options:
     """One field a parameter. An empty list of numbers or of names is "not given"."""
 
-    odom_frame: str = _of("odom", "fixed frame of /odom, the path and the landmarks")
-    base_frame: str = _of(
+    odom_frame: str = parameter("odom", "fixed frame of /odom, the path and the landmarks")
+    base_frame: str = parameter(
         "base_link", "frame whose pose is told; empty: the IMU's (with wheels alone what they move)"
     )
-    imu_frame: str = _of("", "frame of the IMU, in place of its messages' frame_id")
-    left_camera_frame: str = _of("", "optical frame of the left camera, in place of frame_id")
-    publish_odom_to_base_tf: bool = _of(True, "send odom -> base on /tf")
-    motion: str = _of(
+    imu_frame: str = parameter("", "frame of the IMU, in place of its messages' frame_id")
+    left_camera_frame: str = parameter("", "optical frame of the left camera, in place of frame_id")
+    publish_odom_to_base_tf: bool = parameter(True, "send odom -> base on /tf")
+    motion: str = parameter(
         "imu",
         "what tells the motion between pictures: imu (topic imu), gyro_accel (gyro and accel "
         "apart), or wheels in place of an IMU",
         MOTIONS,
     )
-    wheels_beside_imu: bool = _of(False, "use the wheels' velocity beside the IMU")
-    wheels_type: str = _of(
+    wheels_beside_imu: bool = parameter(False, "use the wheels' velocity beside the IMU")
+    wheels_type: str = parameter(
         "nav_msgs/msg/Odometry",
         "type of the topic wheels",
         ("nav_msgs/msg/Odometry", "geometry_msgs/msg/TwistWithCovarianceStamped"),
     )
-    wheel_sigma_mps: list[float] = _of(
+    wheel_sigma_mps: list[float] = parameter(
         [0.05, 0.05, 0.05],
         "noise of the wheels' velocity beside an IMU along x, y, z of their frame, where the "
         "message gives no variance; y and z are how far the base slides and hops",
     )
-    tracks_type: str = _of(
+    tracks_type: str = parameter(
         "", "type of the topic tracks; empty: pictures are followed here", ("", *TRACKS)
     )
-    calibration: list[str] = _of(
+    calibration: list[str] = parameter(
         [""], "calibration files of any kind that `pelorus convert` reads; empty: camera_info"
     )
-    rectified: bool = _of(False, "the pictures are rectified already (image_rect)")
-    T_cam_imu: list[float] = _of(
+    rectified: bool = parameter(False, "the pictures are rectified already (image_rect)")
+    T_cam_imu: list[float] = parameter(
         [0.0], "4 x 4 by rows: q_cam = T s_imu of the left camera, in place of /tf_static"
     )
-    T_base_imu: list[float] = _of(
+    T_base_imu: list[float] = parameter(
         [0.0], "4 x 4 by rows: q_base = T s_imu, in place of /tf_static; one 0: not given"
     )
-    sync_matching_threshold_ms: float = _of(
+    sync_matching_threshold_ms: float = parameter(
         2.0, "left and right pictures belong together if their stamps differ by so much at most"
     )
-    accel_scale: float = _of(1.0, "to m/s^2: 9.80665 for an IMU that tells g")
-    gyro_scale: float = _of(1.0, "to rad/s: 0.0174533 for an IMU that tells degrees")
-    image_transport: str = _of("raw", "raw, or compressed (topic image/compressed)", TRANSPORTS)
-    image_qos: str = _of("sensor_data", "of pictures: sensor_data (best effort) or reliable", QOS)
-    pairs_waiting: int = _of(
+    accel_scale: float = parameter(1.0, "to m/s^2: 9.80665 for an IMU that tells g")
+    gyro_scale: float = parameter(1.0, "to rad/s: 0.0174533 for an IMU that tells degrees")
+    image_transport: str = parameter(
+        "raw", "raw, or compressed (topic image/compressed)", TRANSPORTS
+    )
+    image_qos: str = parameter(
+        "sensor_data", "of pictures: sensor_data (best effort) or reliable", QOS
+    )
+    pairs_waiting: int = parameter(
         3, "pairs of pictures that may wait to be followed; of more the new ones are left out"
     )
-    settings: list[str] = _of(
+    settings: list[str] = parameter(
         [""], "settings of the filter, name=value as pelorus-replay has them: pixel-sigma=1"
     )
-    precision: str = _of("float32", "float32, as on the robot's controller, or float64", PRECISIONS)
-    initial_pose: list[float] = _of(
+    precision: str = parameter(
+        "float32", "float32, as on the robot's controller, or float64", PRECISIONS
+    )
+    initial_pose: list[float] = parameter(
         [0.0], "x y z qx qy qz qw of the base in odom at the start; one 0: the origin, looking at x"
     )
-    initial_pose_sigma: list[float] = _of([0.01, 0.01], "of initial_pose: m, rad")
-    log: str = _of("", "recording of all that is used, drive.plr(.zst); replays to the bit")
-    state_file: str = _of("", "file of the services save_state and load_state")
-    moved_sigma: list[float] = _of(
+    initial_pose_sigma: list[float] = parameter([0.01, 0.01], "of initial_pose: m, rad")
+    log: str = parameter("", "recording of all that is used, drive.plr(.zst); replays to the bit")
+    state_file: str = parameter("", "file of the services save_state and load_state")
+    moved_sigma: list[float] = parameter(
         [0.0, 0.0], "how far it may have moved between save_state and load_state: m, rad"
     )
-    path_length: int = _of(1000, "poses kept in the path")
+    path_length: int = parameter(1000, "poses kept in the path")
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Self:
@@ -178,6 +184,8 @@ def misspelt(given: Iterable[str], builtin: Iterable[str] = ()) -> list[str]:
         if name == "use_sim_time" or name.startswith(("qos_overrides.", "start_type_description")):
             continue
         near = difflib.get_close_matches(name, known, 1)
-        meant = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(sorted(table()))}"
+        meant = (
+            f"; did you mean {near[0]}?" if near else f"; there are {', '.join(sorted(table()))}"
+        )
         told.append(f"there is no parameter {name}{meant}")
     return told
