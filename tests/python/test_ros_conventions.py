@@ -44,7 +44,7 @@ def error_and_covariances(seed: int) -> tuple[Floats, Floats]:
     off = START_SIGMA * chance.standard_normal(6)  # of what is told: T = told Exp(off)
     told = se3.compose(begin, se3.inverse(se3.exp(off[:3], off[3:])))
     P = conventions.from_ros(told.R, conventions.to_ros(told.R, np.diag(START_SIGMA**2)))
-    odometry = Odometry(Setup(recording.header, {}), T_IB, given=Given(told, P))
+    odometry = Odometry(Setup(recording.header, recording.settings), T_IB, given=Given(told, P))
     odom = [one for m in data for one in odometry.add(m)][-1]
     at = int(np.nonzero(recording.truth_t_ns == odom.t_ns)[0][0])
     error = conventions.error_in_ros(truth.at(at), odom.T_OB)

@@ -154,13 +154,19 @@ class Odometry:
             self.drive, self._start = self._new_drive(start), None
         if self._resume is not None:
             moved, self._resume = self._resume, None
-            self.drive.filter.resume(due.t_ns, moved if moved.any() else None)
+            self._go_on(self.drive, due.t_ns, moved)
         estimate = self.drive.use(due)
         if estimate is None and not isinstance(due, Stereo) and self._is_silent(due.t_ns):
             estimate = self.drive.estimate()
         if estimate is not None and estimate.started:
             self._told_ns = estimate.t_ns
             yield self.odom(estimate)
+
+    def _go_on(self, drive: Drive, t_ns: int, moved: Floats) -> None:
+        """From a saved state. Where nothing lies between, as if it had never been interrupted."""
+        between_ns = t_ns - drive.filter.time_ns
+        if moved.any() or not 0 <= between_ns <= self.sequencer.gap_ns:
+            drive.filter.resume(t_ns, moved if moved.any() else None)
 
     def _is_silent(self, t_ns: int) -> bool:
         """Whether nothing was told for long, though the drive has begun."""
