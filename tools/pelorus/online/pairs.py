@@ -37,41 +37,39 @@ class Pairing(Generic[Item]):
     _sides: tuple[list[tuple[int, Item]], list[tuple[int, Item]]] = field(
         default_factory=lambda: ([], [])
     )
+    _stamps: tuple[deque[int], deque[int]] = field(
+        default_factory=lambda: (deque(maxlen=GAPS_KEPT), deque(maxlen=GAPS_KEPT))
+    )
     _gaps_ns: deque[int] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
 
     def add(self, is_right: bool, t_ns: int, item: Item) -> Pair[Item] | None:
         """Returns the pair that this item completes; older ones without partner are let go."""
         own, other = self._sides[is_right], self._sides[not is_right]
+        self._stamps[is_right].append(t_ns)
         nearest = min(other, key=lambda one: abs(one[0] - t_ns), default=None)
         if nearest is None or abs(nearest[0] - t_ns) > self.within_ns:
             own.append((t_ns, item))
             if len(own) > WAITING_MAX:
-                self._let_go(own, own[0][0], other)
+                self._let_go(is_right, own[0][0])
             return None
-        for side in (own, other):
-            self._let_go(side, min(t_ns, nearest[0]) - 1, ())
+        for side in (False, True):
+            self._let_go(side, min(t_ns, nearest[0]) - 1)
         other.remove(nearest)
         self.paired += 1
-        self._gaps_ns.append(abs(nearest[0] - t_ns))
         left, right = (nearest, (t_ns, item)) if is_right else ((t_ns, item), nearest)
         return Pair(left[0], left[1], right[1])
 
-    def _let_go(
-        self,
-        side: list[tuple[int, Item]],
-        until_ns: int,
-        other: list[tuple[int, Item]] | tuple[()],
-    ) -> None:
-        gone = [one for one in side if one[0] <= until_ns]
+    def _let_go(self, is_right: bool, until_ns: int) -> None:
+        side = self._sides[is_right]
+        gone = [t_ns for t_ns, _ in side if t_ns <= until_ns]
         side[:] = [one for one in side if one[0] > until_ns]
         self.alone += len(gone)
-        for t_ns, _ in gone:
-            if other:
-                self._gaps_ns.append(min(abs(t - t_ns) for t, _ in other))
+        others = self._stamps[not is_right]
+        self._gaps_ns += [min(abs(t - t_ns) for t in others) for t_ns in gone if others]
 
     @property
     def usual_gap_ms(self) -> float | None:
-        """How far apart the two are as a rule; None before there was anything to compare."""
+        """Returns how far from the nearest the ones without partner are, as a rule; None if none."""
         return median(self._gaps_ns) * 1e-6 if self._gaps_ns else None
 
 
