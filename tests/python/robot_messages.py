@@ -8,46 +8,54 @@ from typing import Any
 
 import numpy as np
 from pelorus.frames import Camera, Header, Imu, Message, Stereo, Twist
-from pelorus.recording import Recording
 from pelorus_ros.conventions import quaternion
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options
 
 
 def header(t_ns: int, frame: str = "") -> Fields:
+    """Returns a header."""
     return Fields(stamp=Fields(sec=t_ns // 10**9, nanosec=t_ns % 10**9), frame_id=frame)
 
 
 def vector(x: Any) -> Fields:
+    """Returns a Vector3."""
     return Fields(x=float(x[0]), y=float(x[1]), z=float(x[2]))
 
 
 def imu(t_ns: int, a: Any, w: Any, frame: str = "imu") -> Fields:
+    """Returns a sensor_msgs/Imu."""
     head = header(t_ns, frame)
     return Fields(header=head, linear_acceleration=vector(a), angular_velocity=vector(w))
 
 
 def tracks(m: Stereo, frame: str = "camera") -> Fields:
+    """Returns a pelorus_msgs/StereoTracks."""
     u0, v0, u1, v1 = m.pixels.T
     head = header(m.t_ns, frame)
     return Fields(header=head, id=m.ids, left_u=u0, left_v=v0, right_u=u1, right_v=v1)
 
 
 def wheels(t_ns: int, v: Any, w: Any, frame: str = "base_link") -> Fields:
+    """Returns a nav_msgs/Odometry."""
     twist = Fields(linear=vector(v), angular=vector(w))
     head, both = header(t_ns, "odom"), Fields(twist=twist, covariance=np.zeros(36))
     return Fields(header=head, child_frame_id=frame, twist=both)
 
 
 def camera_info(camera: Camera, is_right: bool) -> Fields:
+    """Returns the camera_info of a rectified camera."""
     K = np.array([[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1]])
     shift = -camera.fx_px * camera.baseline_m if is_right else 0.0
     P = np.column_stack((K, (shift, 0, 0)))
-    return Fields(k=K.ravel(), d=np.zeros(5), r=np.eye(3).ravel(), p=P.ravel(), width=640, height=480,
-                  distortion_model="plumb_bob")  # fmt: skip
+    return Fields(
+        k=K.ravel(), d=np.zeros(5), r=np.eye(3).ravel(), p=P.ravel(), width=640, height=480,
+        distortion_model="plumb_bob",
+    )  # fmt: skip
 
 
 def transform(parent: str, child: str, R: Any, p: Any) -> Fields:
+    """Returns a tf2_msgs/TFMessage."""
     turn = dict(zip("xyzw", quaternion(np.asarray(R)), strict=True))
     moved = Fields(translation=vector(p), rotation=Fields(**turn))
     one = Fields(header=header(0, parent), child_frame_id=child, transform=moved)
@@ -81,7 +89,3 @@ def driven(estimator: Estimator, messages: list[Message]) -> list[Any]:
         elif isinstance(m, Stereo):
             told += estimator.tracks(tracks(m))
     return told
-
-
-def messages_of(recording: Recording) -> list[Message]:
-    return list(recording.messages())

@@ -106,5 +106,7 @@ def test_mounting_joins_frames_by_their_common_parent_and_names_those_it_knows()
     T = mounting.between("imu", "camera")
     np.testing.assert_allclose(T.R, turn.T, atol=1e-12)
     np.testing.assert_allclose(T.p, turn.T @ [0.1, -0.2, 0], atol=1e-12)
-    with pytest.raises(NoChain, match="where 'lidar' stands.*known frames: base_link, camera, imu"):
+    with pytest.raises(
+        NoChain, match=r"where 'lidar' stands.*known frames: base_link, camera, imu"
+    ):
         mounting.between("lidar", "camera")

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from pelorus.cli import main
 from pelorus.frames import Header, Imu, Stereo
 from pelorus.wire import messages_of
 from robot import Played, Robot, imu_message, info_message, tracks_message, transform_message
-from sensor_msgs.msg import CameraInfo
 from tf2_msgs.msg import TFMessage
 
 DELAY_NS = 20_000_000  # tracks come so much after their exposure
@@ -40,6 +37,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     assert main(["simulate", "--seed", "3", "--duration", "6", "--imu-rate", "200", str(file)]) == 0
     messages = messages_of(file)
     header = next(m for m in messages if isinstance(m, Header))
+    infos = {
+        side: info_message(header.camera, (640, 480), side == "right", "left_optical")
+        for side in ("left", "right")
+    }
     played: list[Played] = []
     for m in messages:
         if isinstance(m, Imu):
@@ -47,24 +48,22 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
                 played.append(Played(t, len(played), "imu", imu_message(t, a, w)))
         elif isinstance(m, Stereo):
             message = tracks_message(m.t_ns, m.ids, m.pixels)
+            for side, info in infos.items():  # as a driver does, with every picture
+                played.append(Played(m.t_ns, len(played), f"{side}/camera_info", info))
             played.append(Played(m.t_ns + DELAY_NS, len(played), "tracks", message))
     return Recorded(header, tuple(sorted(played)))
 
 
-def mounted(robot: Robot, header: Header, **more: Any) -> None:
-    """Sends what does not change: camera_info and /tf_static."""
-    size = 640, 480
-    for side in ("left", "right"):
-        info = info_message(header.camera, size, side == "right", "left_optical")
-        robot.publisher(f"{side}/camera_info", CameraInfo, latched=True).publish(info)
+def mounted(robot: Robot, header: Header) -> None:
+    """Sends /tf_static."""
     R = np.asarray(header.R_CB).T
     links = [transform_message("imu", "left_optical", R, -R @ header.t_CB_m)]
     links.append(
-        transform_message("base_link", "imu", np.eye(3), more.get("imu_at", (0.2, 0, 0.1)))
+        transform_message("base_link", "imu", np.eye(3), (0.2, 0, 0.1))
     )
     robot.publisher("/tf_static", TFMessage, latched=True).publish(TFMessage(transforms=links))
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Iterator[Path]:
-    yield tmp_path
+def folder(tmp_path: Path) -> Path:
+    return tmp_path

@@ -58,7 +58,9 @@ def test_a_drive_is_estimated_as_it_comes_and_its_log_replays_to_the_bit(
         robot.stop()
         odom, tf = robot.odom, robot.tf
     assert main(["compare", str(log)]) == 0
-    assert len(poses_in(log)) >= recorded.frames - 1
+    answered = np.array([m.t_ns for m in poses_in(log)])
+    assert len(answered) > 0.8 * recorded.frames
+    assert set(np.diff(answered)) == {100_000_000}  # since the first that was heard none was lost
     assert odom[0].header.frame_id == "odom"
     assert odom[0].child_frame_id == "base_link"
     first = odom[0].pose.pose
@@ -90,7 +92,7 @@ def test_a_camera_that_dies_is_told_and_the_covariance_grows(
     folder: Path, recorded: Recorded
 ) -> None:
     dies = recorded.played[0].arrives_ns + 4 * 10**9
-    blind = [one for one in recorded.played if one.topic == "imu" or one.arrives_ns < dies]
+    blind = [one for one in recorded.played if one.topic != "tracks" or one.arrives_ns < dies]
     with started(folder, recorded) as robot:
         robot.play(blind)
         robot.until(
@@ -107,6 +109,8 @@ def test_a_clock_that_steps_begins_a_new_log_and_both_replay(
     log = folder / "drive.plr"
     later = []
     for one in recorded.played:
+        if one.topic.endswith("camera_info"):
+            continue
         message = type(one.message)()
         for name in one.message.get_fields_and_field_types():
             setattr(message, name, getattr(one.message, name))
@@ -172,7 +176,7 @@ def test_a_value_that_is_impossible_is_told_and_the_node_stays_up(folder: Path) 
 
 def test_a_frame_that_tf_does_not_know_gives_no_pose(folder: Path, recorded: Recorded) -> None:
     with started(folder, recorded, base_frame="chassis") as robot:
-        robot.play(recorded.played[:300], 2.0)
+        robot.play(recorded.played[:400], 2.0)
         robot.until(
             lambda: any("where 'chassis' stands" in w for w in robot.messages_of("setup")), "frame"
         )
@@ -206,7 +210,7 @@ def test_pictures_without_texture_are_taken_and_never_make_a_pose_that_claims_to
     folder: Path, recorded: Recorded
 ) -> None:
     grey = np.full((120, 160), 128, np.uint8)
-    played = [one for one in recorded.played if one.topic == "imu"]
+    played = [one for one in recorded.played if one.topic != "tracks"]
     begin = played[0].arrives_ns
     for k in range(20):
         t = begin + k * 10**8

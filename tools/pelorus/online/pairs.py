@@ -69,7 +69,7 @@ class Pairing(Generic[Item]):
 
     @property
     def usual_gap_ms(self) -> float | None:
-        """Returns how far from the nearest the ones without partner are, as a rule; None if none."""
+        """Returns how far off the nearest one is, as a rule, of those without partner."""
         return median(self._gaps_ns) * 1e-6 if self._gaps_ns else None
 
 

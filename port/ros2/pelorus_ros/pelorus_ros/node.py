@@ -175,13 +175,28 @@ class PelorusNode(Node):
         self._subscribe(topic, CompressedImage if packed else Image, callback, profile)
 
     def _listen(self, topic: str, kind: Any, use: Callable[..., list[Odom]], depth: int) -> None:
-        self._subscribe(topic, kind, partial(self._arrived, use, False), qos(depth))
+        """Takes all that waits at once: the executor alone would take one message a round, and
+        on a busy machine an IMU falls seconds behind the camera.
+        """
+        made: list[Any] = []
 
-    def _subscribe(self, topic: str, kind: Any, callback: Any, profile: QoSProfile) -> None:
+        def take_all(message: Any) -> None:
+            self._arrived(use, False, message)
+            while made:
+                with made[0].handle:
+                    taken = made[0].handle.take_message(kind, False)
+                if taken is None:
+                    return
+                self._arrived(use, False, taken[0])
+
+        made.append(self._subscribe(topic, kind, take_all, qos(depth)))
+
+    def _subscribe(self, topic: str, kind: Any, callback: Any, profile: QoSProfile) -> Any:
         made = self.create_subscription(kind, topic, callback, profile)
         package, _, _ = kind.__module__.partition(".msg")
         self._inputs[made.topic_name] = f"{package}/msg/{kind.__name__}"
         self._asked[made.topic_name] = topic
+        return made
 
     def _listen_typed(self, topic: str, name: str, use: Callable[..., list[Odom]]) -> None:
         kind = self._type(name)
