@@ -58,9 +58,7 @@ def mounted(robot: Robot, header: Header) -> None:
     """Sends /tf_static."""
     R = np.asarray(header.R_CB).T
     links = [transform_message("imu", "left_optical", R, -R @ header.t_CB_m)]
-    links.append(
-        transform_message("base_link", "imu", np.eye(3), (0.2, 0, 0.1))
-    )
+    links.append(transform_message("base_link", "imu", np.eye(3), (0.2, 0, 0.1)))
     robot.publisher("/tf_static", TFMessage, latched=True).publish(TFMessage(transforms=links))
 
 
