@@ -155,7 +155,7 @@ def test_a_camera_that_dies_is_lost_and_its_topic_is_named(
 ) -> None:
     head, messages = by_imu
     robot = equipped(Estimator(options()), head)
-    dies = messages[1].t_ns + 4 * 10**9  # type: ignore[attr-defined]
+    dies = next(m.t_ns for m in messages if isinstance(m, Imu)) + 4 * 10**9
     seeing = [m for m in messages if isinstance(m, Imu) or getattr(m, "t_ns", 0) < dies]
     half = next(k for k, m in enumerate(seeing) if getattr(m, "t_ns", 0) >= dies)
     driven(robot, seeing[:half])

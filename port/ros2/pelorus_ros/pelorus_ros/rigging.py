@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from pelorus import se3
+from pelorus.errors import PelorusError
 from pelorus.frames import Process
 from pelorus.rig import read as rig_files
 from pelorus.rig.camera_info import Info, Infos
@@ -84,7 +85,15 @@ class Rigging:
             rig = rig_files.read_rig(self.options.files, lens)
         else:
             rig = self._of_camera_info()
-        return (rig.of_size(*size) if size[0] else rig), None
+        if not size[0]:
+            return rig, None
+        if rig.sizes[0][0] and size not in rig.sizes:
+            told = " or ".join(f"{width} x {height}" for width, height in rig.sizes)
+            raise PelorusError(
+                f"the pictures have {size[0]} x {size[1]} pixels, the calibration is of {told}: "
+                "give the one of these pictures"
+            )
+        return rig.of_size(*size), None
 
     def _of_camera_info(self) -> Rig:
         lacking = [f"{side}/camera_info" for side in SIDES if side not in self._infos]
