@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import runpy
+import sys
 from pathlib import Path
+from types import ModuleType
 from types import SimpleNamespace as Fields
 from typing import Any
 
@@ -30,6 +33,9 @@ from robot_messages import (
     transform,
     wheels,
 )
+from ruamel.yaml import YAML
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2"
 
 
 @pytest.fixture(autouse=True)
@@ -244,3 +250,31 @@ def test_health_says_why_and_what_to_do() -> None:
     assert status.level is Level.ERROR
     assert status.do
     assert of_health(0, 0).level is Level.OK
+
+
+# --- the example ----------------------------------------------------------------------------------
+
+
+class Kept:
+    """Stands for a class of ROS' launch: keeps what it is made of."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        self.given, self.named = given, named
+
+
+def test_example_starts_the_node_with_parameters_and_topics_that_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    modules = {"launch": {"LaunchDescription": Kept}, "launch_ros.actions": {"Node": Kept}}
+    for name, classes in (*modules.items(), ("launch_ros", {})):
+        module = ModuleType(name)
+        vars(module).update(classes)
+        monkeypatch.setitem(sys.modules, name, module)
+    found = runpy.run_path(str(EXAMPLE / "robot.launch.py"))
+    (node,) = found["generate_launch_description"]().given[0]
+    file, more = node.named["parameters"]
+    given = YAML(typ="safe").load(Path(file))["pelorus"]["ros__parameters"] | more
+    assert misspelt(given) == []
+    assert Options.of({name: default for name, (default, _) in table().items()} | given).rectified
+    topics = {*Estimator(Options()).topics(), "left/camera_info", "right/camera_info"}
+    assert {source for source, _ in node.named["remappings"]} == topics

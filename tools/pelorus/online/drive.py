@@ -173,9 +173,10 @@ class Drive:
 
     def place(self, start: Start) -> None:
         """Sets the pose in the middle of the drive; the landmarks go."""
-        self._start = Start.unpack(start.pack())
+        self._start, before = Start.unpack(start.pack()), self._resets
         self._write(self._start)
         self._begin()
+        self._resets = before  # a controller sees the jump in reset_count
 
     def _begin(self) -> None:
         """Sets the pose of the START, whose time is that of the first message."""
