@@ -229,9 +229,7 @@ def test_pictures_of_another_size_than_the_calibrations_are_told_and_give_no_pos
         robot.heard(["left/image", "right/image", "imu"])
         robot.play(played)
         robot.until(
-            lambda: any(
-                "calibration is of 640 x 480" in w for w in robot.messages_of("setup")
-            ),
+            lambda: any("calibration is of 640 x 480" in w for w in robot.messages_of("setup")),
             "size",
         )
         assert not robot.odom
