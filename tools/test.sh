@@ -212,12 +212,12 @@ ensure_python # there by now; if not, it says why and ends this
 # --- form, beside the first build -----------------------------------------------------------------
 
 beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tools/firmware tools/*.py tests/python tests/layering tests/golden tests/fuzz tests/independent \
-    tests/recordings examples
+    tools/pelorus tools/firmware tools/*.py port/ros2/pelorus_ros/pelorus_ros/[!n]*.py tests/python tests/layering tests/golden tests/fuzz tests/independent \
+    tests/recordings examples/*.py
 beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
-beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests examples
-beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests examples
+beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests port examples
+beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests port examples
 if command -v clang-format-14 >/dev/null; then
     beside 'C format' check_format
 else
@@ -230,6 +230,9 @@ step 'build: gcc' build_preset release "${strict[@]}"
 built=$?
 joined
 [ $built -eq 0 ] && step 'test: gcc' run_ctest build
+if [ $extent != quick ]; then # mostly waiting: its environment and its tests stand beside what follows
+    beside 'ROS 2 node' tools/ros2.sh
+fi
 step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" --dist worksteal \
     tests/python
 

@@ -23,6 +23,7 @@ from pelorus.robot import stream
 from replay_drive import BIN, Record, drive, encode, recorder
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "port" / "ros2" / "pelorus_ros"))  # what of the node needs no ROS
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
 
 

@@ -363,6 +363,10 @@ class Filter:
         """(6, 6), in the same order."""
         return self._doubles("velocity_covariance", (6, 6))
 
+    def trace(self) -> float:
+        """Returns the trace of the whole covariance, whose trend alone means anything."""
+        return float(self._c.filter_trace(self._f))
+
     def bias(self) -> tuple[Floats, Floats]:
         """(6,) and its covariance (6, 6): (b_v, b_w) of twists, (b_a, b_g) of an IMU."""
         b, P = np.empty(6), np.empty((6, 6))
@@ -439,6 +443,11 @@ class Filter:
         P = None if moved is None else checked("moved", moved, (6, 6))
         time = whole_number("t_ns", t_ns, MOST_NS)
         self._checked("resume", self._c.filter_resume(self._f, time, address(P)))
+
+    @property
+    def last_report(self) -> Report:
+        """Returns the last frame's report, of one that was refused too."""
+        return Report.from_buffer_copy(self._report)
 
     @property
     def most_landmarks(self) -> int:

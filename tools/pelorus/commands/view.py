@@ -46,7 +46,7 @@ def view(
 
     Pose with its three-sigma ellipsoid, way, truth, landmarks with theirs, points in the picture
     with those that were rejected, health and why, innovations, biases, what the supervisor saw,
-    computing time. It needs `pip install 'pelorus-slam\\[view]'`. While a robot drives, `pelorus
+    computing time. It needs `pip install 'pelorus-slam\[view]'`. While a robot drives, `pelorus
     stream --view` shows the same.
     """
     if not (rrd or mcap or layout_file or spawn or connect):

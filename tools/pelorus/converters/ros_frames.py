@@ -289,7 +289,7 @@ def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) ->
     stamps, messages = [], []
     for found in progress(bag.written([topic]), f"reading {topic}", bag.count([topic])):
         stamps.append((found.t_ns, found.arrival_ns))
-        messages.append(_observations(where, found.message, calibrated))
+        messages.append(observations(where, found.message, calibrated))
     order = _chosen(bag, topic, stamps, remarks)
     rows = [messages[k] for k in order]
     table = np.concatenate(rows)
@@ -305,7 +305,7 @@ def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) ->
     return Seen(where, times, tracks)
 
 
-def _observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
+def observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
     """(n, 5): id, uL, vL, uR, vR in px."""
     if hasattr(message, "features"):
         found = [[float(getattr(f, name)) for name in RAYS] for f in message.features]
