@@ -84,8 +84,8 @@ def _calibrations(top: Path, of_imu: tuple[Path, ...]) -> tuple[Path, ...]:
     """Of the folder; the files of an IMU that the user gives take the place of its own."""
     beside = top.parent / TUM_VI
     if not (top / CAMERAS[0] / "sensor.yaml").is_file() and (beside / "camchain.yaml").is_file():
-        cameras, imu = map(beside.joinpath, TUM_VI_FILES)
-        return (cameras, *(of_imu or [path for path in (imu,) if path.is_file()]))
+        camchain, imu = map(beside.joinpath, TUM_VI_FILES)
+        return (camchain, *(of_imu or [path for path in (imu,) if path.is_file()]))
     cameras = [top / name / "sensor.yaml" for name in CAMERAS]
     lacking = [path for path in cameras if not path.is_file()]
     if lacking:
