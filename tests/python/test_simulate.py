@@ -226,7 +226,9 @@ def test_frames_stand_so_much_before_a_twist_with_the_pose_of_their_time(
     assert np.allclose(se3.log(back)[1:], lead_ns * 1e-9 * held, rtol=1e-6, atol=1e-13)
 
 
-def test_frames_before_the_readings_of_an_imu_stand_on_its_way(tmp_path: Path, pelorus: Run) -> None:
+def test_frames_before_the_readings_of_an_imu_stand_on_its_way(
+    tmp_path: Path, pelorus: Run
+) -> None:
     target = tmp_path / "lead.plr"
     options = ("--imu-rate", 200, "--duration", 4, "--frame-lead", 1_000_000, "--drop", 0)
     pelorus("simulate", target, *options)
