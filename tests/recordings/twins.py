@@ -4,15 +4,16 @@
 usage: twins.py RECORDING.plr [--bin build/bin] [--every N] [--only-parted] [-- REPLAY OPTIONS]
        twins.py mh01.plr --only-parted -- --config tools/config/imu-adis16448.conf
 
-First comes what the whole drive comes to: how far apart the two are, how often each diverged, and the frame at which
-they first part by more than a tenth of float64's sigma. With --every N or --only-parted a line for each such frame:
+First comes what the whole drive comes to: how far apart the two are, how often each diverged, and
+the frame at which they first part by more than a tenth of float64's sigma. With --every N or
+--only-parted a line for each such frame:
 
 t           s since the first frame
 apart       of the two poses, m and rad
 in sigmas   the largest component of the distance in float64's sigmas
 sigma32/64  largest and smallest ratio of the two sigmas of pose and velocity
-least       smallest pivot of each correlation matrix, pose and velocity, float32's and float64's: 1 where
-            nothing correlates; below 1e-6 float32 has few digits left of the smallest variance
+least       smallest pivot of each correlation matrix, pose and velocity, float32's and float64's:
+            1 where nothing correlates; below 1e-6 float32 has few digits left
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def frames_of(messages: Sequence[Message]) -> Iterator[tuple[int, Frame]]:
 
 
 def least_pivot(P: Floats) -> float:
-    """Of the Cholesky factor of P scaled to ones on its diagonal, squared; not positive: negative."""
+    """Of the Cholesky factor of P scaled to ones on its diagonal, squared; negative: none."""
     diagonal = np.diag(P)
     if not (diagonal > 0).all():
         return float(diagonal.min())
@@ -104,7 +105,8 @@ def compared(a: Frame, b: Frame, t_s: float) -> Pair:
 def line(pair: Pair) -> str:
     """Of the table."""
     least = " ".join(f"{x:8.1e}" for x in pair.least)
-    told = " ".join(f"{p} diverged" for p, is_so in zip(("f32", "f64"), pair.recovered) if is_so)
+    both = zip(("f32", "f64"), pair.recovered, strict=True)
+    told = " ".join(f"{precision} diverged" for precision, is_so in both if is_so)
     return (
         f"{pair.t_s:8.3f} {pair.apart_m:9.2e} {pair.apart_rad:9.2e} {pair.in_sigmas:9.2e} "
         f"{pair.ratio[0]:7.3f} {pair.ratio[1]:7.3f}  {least}  {told}"
@@ -123,8 +125,8 @@ def summary(pairs: Sequence[Pair]) -> str:
         f"apart by more than {PARTED} sigma: {parted}, in {sum(p.parted for p in pairs)} frames\n"
         f"worst: {worst.apart_m:.2e} m, {worst.apart_rad:.2e} rad, {worst.in_sigmas:.2e} sigmas at "
         f"{worst.t_s:.3f} s\n"
-        f"least pivot: pose {least[0]:.1e} and {least[2]:.1e} in float64, velocity {least[1]:.1e} and "
-        f"{least[3]:.1e}"
+        f"least pivot: pose {least[0]:.1e} and {least[2]:.1e} in float64, "
+        f"velocity {least[1]:.1e} and {least[3]:.1e}"
     )
 
 
