@@ -14,7 +14,8 @@
 
 enum { DRIVES = 40, LONG_DRIVES = 500 };
 enum { ENOUGH_POINTS = 20 };
-static const double ENOUGH_NEAR_M = 10, LEFT_M = 0.05, AGAIN_S = 2, LEFT_SIGMAS = 5;
+static const double ENOUGH_NEAR_M = 10, LEFT_M = 0.05, SENSOR_LEFT_M = 0.5, AGAIN_S = 2,
+                    LEFT_SIGMAS = 5;
 
 typedef struct options {
     unsigned long drives, first_seed, jobs;
@@ -114,10 +115,12 @@ static void ask_beside(const swarm *s) {
     }
 }
 
-/* Enough is in sight, and near enough, to say within 0.05 m where the body is. */
-static bool sees_enough(const swarm_drive *d) {
-    return d->blow == BLOW_BODY && d->points >= ENOUGH_POINTS && d->slots >= d->points &&
-           d->far_m <= ENOUGH_NEAR_M;
+/* Enough is in sight, and near enough, to say within 0.05 m where the body is; and within half a metre where a
+ * sensor that was struck says something else. */
+static double most_left_m(const swarm_drive *d) {
+    if (d->points < ENOUGH_POINTS || d->slots < d->points || d->far_m > ENOUGH_NEAR_M)
+        return HUGE_VAL;
+    return d->blow == BLOW_BODY ? LEFT_M : SENSOR_LEFT_M;
 }
 
 /* Returns what a drive fails on; "" if on nothing. */
@@ -128,7 +131,7 @@ static const char *failing(const swarm_drive *d, const swarm_outcome *x, const u
         return "not finite";
     if (beside && x->diverged > 0 && *beside == 0)
         return "diverged alone";
-    if (sees_enough(d) && x->left_m > LEFT_M)
+    if (x->left_m > most_left_m(d))
         return "left off its place";
     if (d->blow == BLOW_BODY && d->points >= ENOUGH_POINTS && x->again_s > AGAIN_S)
         return "not good within 2 s";
