@@ -53,7 +53,7 @@ class Pair(NamedTuple):
     apart_rad: float
     in_sigmas: float
     ratio: tuple[float, float]
-    least: tuple[float, float, float, float]
+    least: tuple[float, ...]
     recovered: tuple[bool, bool]
 
     @property
