@@ -259,7 +259,8 @@ static plr_real density_of(const plr_filter *f, unsigned which) {
 #define UNLIKELY PLR_R(30)
 
 /* The densities of a step's noise. A force that accelerates the body by more than its own weight, and more
- * than scatter does, is a shock: the reading may be wrong by all of that, for as long as any error lasts. It is that
+ * than scatter does, is a shock: the reading may be wrong by all of that, for as long as any error lasts, and the
+ * gyro, which took the same blow, by all that it reads. It is that
  * of the whole interval: what is left of one that a frame cut makes up for rounded stamps too. A reading held
  * for longer than usual is wrong by what changes meanwhile: at first as successive readings differ, later as they
  * scatter at all. */
@@ -267,14 +268,18 @@ static void densities(const plr_filter *f, const plr_step *by, const plr_real ga
                       plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
     const plr_real g = f->par.gravity, scatter2 = UNLIKELY * at->scatter2[0];
-    plr_real forced[3];
+    plr_real forced[3], turned[3];
     for (unsigned i = 0; i < 2; i++)
         density[i] = density_of(f, i);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         forced[i] = by->whole[i] - f->bias[i] + gamma[i];
+        turned[i] = by->whole[3 + i] - f->bias[3 + i];
+    }
     const plr_real beyond2 = plr_dot3(forced, forced) - (scatter2 > g * g ? scatter2 : g * g);
-    if (beyond2 > 0)
+    if (beyond2 > 0) {
         density[0] = PLR_FMA(LASTING_S, beyond2, density[0]);
+        density[1] = PLR_FMA(LASTING_S, plr_dot3(turned, turned), density[1]);
+    }
     if (!(at->usual_s > 0) || by->interval <= PLR_LONG_INTERVALS * at->usual_s)
         return;
     const plr_real intervals = by->interval / at->usual_s;

@@ -96,9 +96,7 @@ static bool lost_readings(const plr_filter *f, plr_real h) {
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_step *step) {
-    /* a velocity that is held has corrected what the older reading did */
-    const bool makes_up =
-        !lost_readings(f, plr_seconds(t_ns - f->reading_ns)) && !plr_velocity_is_held(f, t_ns);
+    const bool makes_up = !lost_readings(f, plr_seconds(t_ns - f->reading_ns));
     plr_mean_reading(f, f->config.twist_timing, makes_up, t_ns, reading, step);
 }
 
@@ -143,22 +141,34 @@ static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
     memcpy(reading, f->bias, PLR_READING_DIM * sizeof *reading);
 }
 
+/* What the older reading had wrong in the part of the interval that it bridged counts by as much as the
+ * reading does beside the velocities that are held: T of plr_velocity_fuse. */
+static void make_up(const plr_step *by, const plr_real T[PLR_POSE_SQUARE],
+                    plr_real xi[PLR_POSE_DIM]) {
+    for (unsigned j = 0; j < PLR_POSE_DIM; j++) {
+        const plr_real wrong = by->seconds * (by->mean[j] - by->whole[j]);
+        for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+            xi[i] = PLR_FMA(T[PLR_POSE_DIM * i + j], wrong, xi[i]);
+    }
+}
+
 static void step(plr_filter *f, plr_time_ns t_ns, const plr_step *by) {
-    const plr_real *reading = by->mean, seconds = by->seconds;
+    const plr_real seconds = by->seconds;
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
         variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];
     plr_motion *m = &f->motion;
     bool fused = plr_velocity_is_held(f, t_ns);
-    displacement(f, reading, seconds, xi);
+    displacement(f, fused ? by->whole : by->mean, seconds, xi);
     step_variance(f, seconds, by->interval, variance);
     if (fused) {
         memset(V, 0, sizeof V);
         for (int i = 0; i < PLR_POSE_DIM; i++)
             V[(PLR_POSE_DIM + 1) * i] = variance[i];
         plr_velocity_fuse(f, t_ns, seconds, xi, V, T);
+        make_up(by, T, xi);
         if (!is_possible(xi)) { /* no step of a robot: the velocities are wrong */
             plr_velocity_forget(f);
-            displacement(f, reading, seconds, xi);
+            displacement(f, by->mean, seconds, xi);
             fused = false;
         }
     }

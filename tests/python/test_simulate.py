@@ -16,6 +16,7 @@ from pelorus.errors import PelorusError
 from pelorus.frames import Header, Kind, Landmark, Role, Stereo, TwistTiming
 from pelorus.layout import Floats
 from pelorus.simulation import drive, scene
+from pelorus.simulation.imu import Imu
 from pelorus.simulation.simulate import Options, Simulation, simulate
 from pelorus.tracks import project
 from scipy.linalg import expm
@@ -206,6 +207,45 @@ def test_frames_of_a_slow_camera_stand_later_in_the_file(tmp_path: Path, pelorus
         elif isinstance(message, Stereo) and latest < 2_900_000_000:
             delays.append(latest - message.t_ns)
     assert set(delays) == {50_000_000}  # the last twist before 55 ms have passed
+
+
+@pytest.mark.parametrize("timing", list(TwistTiming))
+@pytest.mark.parametrize("lead_ns", [1, 416, 1_000_000])
+def test_frames_stand_so_much_before_a_twist_with_the_pose_of_their_time(
+    timing: TwistTiming, lead_ns: int
+) -> None:
+    options = replace(PERFECT, twist_timing=timing, duration_s=5.0)
+    there = simulate(options).recording
+    before = simulate(replace(options, frame_lead_ns=lead_ns)).recording
+    assert before.frame_t_ns[0] == 0
+    assert set(there.frame_t_ns[1:] - before.frame_t_ns[1:]) == {lead_ns}
+    assert (before.truth_t_ns == before.frame_t_ns).all()
+    back = se3.compose(se3.inverse(before.truth), there.truth)
+    ends = np.searchsorted(there.twist_t_ns, there.frame_t_ns[1:])
+    held = motion.held(np.hstack((there.v_B_mps, there.w_B_radps)), timing)[ends - 1]
+    assert np.allclose(se3.log(back)[1:], lead_ns * 1e-9 * held, rtol=1e-6, atol=1e-13)
+
+
+def test_frames_before_the_readings_of_an_imu_stand_on_its_way(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    target = tmp_path / "lead.plr"
+    options = ("--imu-rate", 200, "--duration", 4, "--frame-lead", 1_000_000, "--drop", 0)
+    pelorus("simulate", target, *options)
+    frames = [message.t_ns for message in messages_of(target, Stereo)]
+    assert frames[:3] == [0, 99_000_000, 199_000_000]
+    drive_of = Options(imu=Imu(imu_rate_hz=200), duration_s=4)
+    there, before = (
+        simulate(replace(drive_of, frame_lead_ns=lead)).recording for lead in (0, 1_000_000)
+    )
+    assert there.truth_velocity is not None
+    way = np.linalg.norm(there.truth.p - before.truth.p, axis=1)[1:]
+    assert np.allclose(way, 1e-3 * np.linalg.norm(there.truth_velocity, axis=1)[1:], atol=1e-5)
+
+
+def test_a_lead_of_a_whole_twist_is_refused() -> None:
+    with pytest.raises(PelorusError, match="--frame-lead is 10000000: less than from one twist"):
+        simulate(replace(PERFECT, twist_rate_hz=100.0, frame_lead_ns=10_000_000))
 
 
 def test_readings_hold_as_the_timing_says_in_the_profile() -> None:

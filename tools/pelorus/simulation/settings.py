@@ -19,6 +19,7 @@ from pelorus.errors import PelorusError
 
 UNITS = (
     "_s",
+    "_ns",
     "_hz",
     "_mps",
     "_mps2",

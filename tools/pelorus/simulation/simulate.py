@@ -28,7 +28,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.simulation import by_imu, scene, sensors, settings, smooth
-from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
+from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, exp, rotate, stood
 from pelorus.simulation.imu import NO_FAULTS, NO_IMU, Imu, ImuFaults, Sensed
 from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
 from pelorus.simulation.readings import Sensing, read
@@ -104,6 +104,12 @@ class Options:
     camera_delay_s: float = setting(
         0.0, "Frames stand so much later in the file than their time, as off a slow camera.", "S"
     )
+    frame_lead_ns: int = setting(
+        0,
+        "Frames are taken so much before a twist or a reading, as stamps that are rounded lie: 416 "
+        "is EuRoC's.",
+        "NS",
+    )
     stop: Span | None = setting(None, "From then on the robot rests.")
     mishaps: Mishaps = NO_MISHAPS
     readings: Mapping[str, Sensing] = field(default_factory=dict)  # of small sensors, by name
@@ -127,6 +133,8 @@ class Options:
         require("twist_rate_hz", self.twist_rate_hz, whole, due)
         short = self.frames <= FRAMES_MAX
         require("duration_s", self.duration_s, short, f"at most {FRAMES_MAX} frames")
+        within = self.frame_lead_ns * self.twist_rate_hz < 1e9
+        require("frame_lead_ns", self.frame_lead_ns, within, "less than from one twist to the next")
         turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
         due = f"at most {TURN_MAX_RAD} rad a twist"
         require("lap_s", self.lap_s, turn < TURN_MAX_RAD, due)
@@ -213,8 +221,8 @@ def simulate(options: Options) -> Simulation:
         way, sensed = _way(options, t_ns), None
     v, w, bias_v, bias_w = _readings(options, way, chances)
     at_frames = np.arange(options.frames) * options.twists_per_frame
-    frame_t_ns = t_ns[at_frames]
-    truth = options.mishaps.jumped(frame_t_ns, way.poses.at(at_frames))
+    frame_t_ns = np.maximum(t_ns[at_frames] - options.frame_lead_ns, 0)
+    truth = options.mishaps.jumped(frame_t_ns, _led(options, way, at_frames))
     kept = np.nonzero(chances["drops"].random(options.frames) >= options.drop)[0]
     tracks, outlier = _observe(options, frame_t_ns[kept], truth.at(kept), points, chances)
     recording = Recording(
@@ -260,6 +268,23 @@ def _way(options: Options, t_ns: Times) -> Drive:
         return stood(t_ns)
     timing, speed, lap = options.twist_timing, options.speed_mps, options.lap_s
     return drive(t_ns, timing, speed, lap, options.stop)
+
+
+def _led(options: Options, way: Drive, nodes: Indices) -> Poses:
+    """The poses at these nodes, but for the first one, as much before them as frames are: along the
+    twist that holds there. Of an IMU's way that is the rate at the node, which over 1 ms is true to
+    some micrometres.
+    """
+    poses = way.poses.at(nodes)
+    if not options.frame_lead_ns:
+        return poses
+    held = [way.v_B_mps[1:], way.w_B_radps[1:]]
+    if not options.imu.is_there:
+        held = [motion.held(x, options.twist_timing) for x in (way.v_B_mps, way.w_B_radps)]
+    lead_s = np.where(nodes > 0, options.frame_lead_ns * 1e-9, 0.0)[:, None]
+    v, w = (x[np.maximum(nodes - 1, 0)] for x in held)
+    steps = exp(-lead_s * v, -lead_s * w)
+    return Poses(poses.R @ steps.R, poses.p + rotate(poses.R, steps.p))
 
 
 def blindness(recording: Recording) -> str:
