@@ -44,7 +44,8 @@ typedef enum plr_process_kind {
 /* How the filter finds its tilt, velocity and biases with an IMU. */
 typedef enum plr_imu_start {
     PLR_IMU_START_AUTO = 0,   /* given, if a velocity is set; else at rest, or in motion if the body
-                                 does not come to rest within 3 s */
+                                 does not come to rest within 3 s, or within 1 s if most
+                                 points that are watched move in the picture */
     PLR_IMU_START_REST = 1,   /* the body stands for a second: tilt and gyro bias are measured */
     PLR_IMU_START_MOTION = 2, /* the body moves: tilt from a tenth of a second, velocity unknown */
     PLR_IMU_START_GIVEN = 3   /* the pose that is set is true, and the velocity with it */

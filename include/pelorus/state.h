@@ -136,6 +136,7 @@ typedef struct plr_alignment {
     plr_real half_mean[PLR_POSE_DIM]; /* over its first half */
     plr_real spread2[2];              /* sums of squares about the mean, linear and angular */
     plr_watched_point points[PLR_WATCHED_POINTS];
+    uint8_t seen_to_move; /* 1: the pictures have shown that the body moves */
 } plr_alignment;
 
 /* What a start in motion has left of position and yaw (docs/MATH.md 19, the anchor). */

@@ -177,6 +177,7 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     if (seen < PLR_POINTS_LEAST ||
         2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
+    f->either.alignment.seen_to_move = 1;
     plr_alignment_restart(f);
     plr_alignment_does_not_stand(f, PLR_IMU_FAULT_MOVES);
 }

@@ -57,9 +57,10 @@ void plr_alignment_clear(plr_filter *f) {
 }
 
 void plr_alignment_restart(plr_filter *f) {
-    const plr_time_ns first = f->either.alignment.first_ns;
+    const plr_alignment before = f->either.alignment;
     memset(&f->either.alignment, 0, sizeof f->either.alignment);
-    f->either.alignment.first_ns = first;
+    f->either.alignment.first_ns = before.first_ns;
+    f->either.alignment.seen_to_move = before.seen_to_move;
 }
 
 /* What is being averaged ends at a pause, and altogether where the clock became another. */
@@ -363,8 +364,9 @@ void plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
     end_stretch(f, t_ns);
     average(at, t_ns, reading);
     const plr_time_ns stretch = t_ns - at->begin_ns;
+    const plr_time_ns wait = at->seen_to_move ? REST_NS : MOVING_NS;
     const bool may_move = kind == PLR_IMU_START_MOTION ||
-                          (kind == PLR_IMU_START_AUTO && t_ns - at->first_ns >= MOVING_NS);
+                          (kind == PLR_IMU_START_AUTO && t_ns - at->first_ns >= wait);
     bool started = false;
     if (stretch >= REST_NS && kind != PLR_IMU_START_MOTION)
         started = try_to_start(f, t_ns, true);
