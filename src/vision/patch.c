@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+#include "vision/patch.h"
+
+#include "math/small.h"
+
+enum { HALF = PLR_PATCH_SIDE / 2, KEPT_HALF = PLR_PATCH_KEPT / 2, FRACTION = 16, WEIGHT = 6 };
+
+#define UNIT     PLR_R(65536)
+#define STEP_MAX PLR_R(2)    /* px */
+#define STEP_END PLR_R(0.02) /* px */
+/* Grey levels' noise that no residual may claim to be below: rounding to whole levels, twice. */
+#define GREY_VAR PLR_R(2.0 / 12 * PLR_GREY * PLR_GREY)
+/* A patch whose place this noise alone makes uncertain by half a pixel has no contrast. */
+#define WEAKEST (GREY_VAR * PLR_R(4))
+
+/* --- cutting --- */
+
+/* The sample at a place in 1/65536 px: grey levels times 16. */
+static inline int32_t sample(const plr_image *image, int32_t x, int32_t y) {
+    const uint8_t *p = image->pixels + (uint32_t)(y >> FRACTION) * image->stride + (x >> FRACTION);
+    const uint8_t *q = p + image->stride;
+    const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63, wy = (y >> (FRACTION - WEIGHT)) & 63;
+    const int32_t top = 64 * p[0] + wx * (p[1] - p[0]), low = 64 * q[0] + wx * (q[1] - q[0]);
+    return (64 * top + wy * (low - top) + 128) >> 8;
+}
+
+/* Places of a window of so many px each way that stay inside, with the neighbour that is interpolated. */
+static bool inside(const plr_image *image, const plr_real at[2], plr_real across, plr_real down) {
+    const plr_real right = (plr_real)image->width - PLR_R(1.01);
+    const plr_real low = (plr_real)image->height - PLR_R(1.01);
+    return at[0] >= across && at[0] + across <= right && at[1] >= down && at[1] + down <= low;
+}
+
+/* Rounded to the weights' resolution. */
+static int32_t fixed(plr_real x) {
+    return (int32_t)(x * UNIT) + (1 << (FRACTION - WEIGHT - 1));
+}
+
+bool plr_patch_cut(const plr_image *image, const plr_real at[2], uint8_t patch[PLR_PATCH_BYTES]) {
+    if (!inside(image, at, KEPT_HALF, KEPT_HALF))
+        return false;
+    const int32_t x = fixed(at[0]), y = fixed(at[1]);
+    for (int j = 0; j < PLR_PATCH_KEPT; j++)
+        for (int i = 0; i < PLR_PATCH_KEPT; i++) {
+            const int32_t s = sample(image, x + (i - KEPT_HALF) * (1 << FRACTION),
+                                     y + (j - KEPT_HALF) * (1 << FRACTION));
+            patch[PLR_PATCH_KEPT * j + i] = (uint8_t)((s + PLR_GREY / 2) / PLR_GREY);
+        }
+    return true;
+}
+
+/* sum a b - sum a sum b / n: the sum of products without the means. */
+static plr_real central(int64_t sum_ab, int32_t sum_a, int32_t sum_b) {
+    return (plr_real)(sum_ab * PLR_SAMPLES - (int64_t)sum_a * sum_b) / PLR_SAMPLES;
+}
+
+bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]) {
+    int32_t T = 0, Jx = 0, Jy = 0, TT = 0, xT = 0, yT = 0, xx = 0, xy = 0, yy = 0;
+    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++)
+        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++) {
+            const uint8_t *p = patch + PLR_PATCH_KEPT * (j + 1) + i + 1;
+            const int32_t s = PLR_GREY * p[0], x = PLR_GREY / 2 * (p[1] - p[-1]);
+            const int32_t y = PLR_GREY / 2 * (p[PLR_PATCH_KEPT] - p[-PLR_PATCH_KEPT]);
+            t->T[k] = (int16_t)s, t->Jx[k] = (int16_t)x, t->Jy[k] = (int16_t)y;
+            T += s, Jx += x, Jy += y;
+            TT += s * s, xT += x * s, yT += y * s;
+            xx += x * x, xy += x * y, yy += y * y;
+        }
+    t->sum_T = T, t->sum_Jx = Jx, t->sum_Jy = Jy;
+    t->TT = central(TT, T, T), t->JxT = central(xT, Jx, T), t->JyT = central(yT, Jy, T);
+    t->H[0] = central(xx, Jx, Jx), t->H[1] = central(xy, Jx, Jy), t->H[2] = central(yy, Jy, Jy);
+    const plr_real det = PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
+    /* the smaller eigenvalue is at least det / trace */
+    return t->TT > 0 && det > WEAKEST * (t->H[0] + t->H[2]);
+}
+
+/* --- sums --- */
+
+bool plr_grid_place(plr_grid *g, const plr_image *image, const plr_real at[2],
+                    const plr_real A[4]) {
+    const plr_real across = HALF * (plr_abs(A[0]) + plr_abs(A[1]));
+    const plr_real down = HALF * (plr_abs(A[2]) + plr_abs(A[3]));
+    if (!(across < PLR_R(64)) || !(down < PLR_R(64)) ||
+        !inside(image, at, across + PLR_R(0.05), down + PLR_R(0.05)))
+        return false;
+    g->x = fixed(at[0]), g->y = fixed(at[1]);
+    for (int i = 0; i < 4; i++)
+        g->A[i] = (int32_t)(A[i] * UNIT);
+    return true;
+}
+
+/* Sums in 32 bits: 81 times the largest product, 4080^2, is 1.35e9. */
+void plr_patch_sum(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
+                   const plr_template *t) {
+    const uint8_t *pixels = image->pixels;
+    const uint32_t stride = image->stride;
+    int32_t I = 0, II = 0, IT = 0, IJx = 0, IJy = 0;
+    int32_t x0 = g->x - HALF * (g->A[0] + g->A[1]), y0 = g->y - HALF * (g->A[2] + g->A[3]);
+    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++, x0 += g->A[1], y0 += g->A[3]) {
+        int32_t x = x0, y = y0;
+        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++, x += g->A[0], y += g->A[2]) {
+            const uint8_t *p = pixels + (uint32_t)(y >> FRACTION) * stride + (x >> FRACTION);
+            const uint8_t *q = p + stride;
+            const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63;
+            const int32_t wy = (y >> (FRACTION - WEIGHT)) & 63;
+            const int32_t top = 64 * p[0] + wx * (p[1] - p[0]);
+            const int32_t low = 64 * q[0] + wx * (q[1] - q[0]);
+            const int32_t v = (64 * top + wy * (low - top) + 128) >> 8;
+            I += v, II += v * v;
+            IT += v * t->T[k], IJx += v * t->Jx[k], IJy += v * t->Jy[k];
+        }
+    }
+    s->I = I, s->II = II, s->IT = IT, s->IJx = IJx, s->IJy = IJy;
+}
+
+void plr_patch_sum_plain(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
+                         const plr_template *t) {
+    int64_t I = 0, II = 0, IT = 0, IJx = 0, IJy = 0;
+    for (int k = 0; k < PLR_SAMPLES; k++) {
+        const int32_t i = k % PLR_PATCH_SIDE - HALF, j = k / PLR_PATCH_SIDE - HALF;
+        const int32_t v = sample(image, g->x + g->A[0] * i + g->A[1] * j,
+                                 g->y + g->A[2] * i + g->A[3] * j);
+        I += v, II += (int64_t)v * v;
+        IT += (int64_t)v * t->T[k], IJx += (int64_t)v * t->Jx[k], IJy += (int64_t)v * t->Jy[k];
+    }
+    s->I = (int32_t)I, s->II = (int32_t)II, s->IT = (int32_t)IT;
+    s->IJx = (int32_t)IJx, s->IJy = (int32_t)IJy;
+}
+
+/* --- fits --- */
+
+/* The sums without their means. */
+typedef struct plr_centred {
+    plr_real II, IT, IJx, IJy;
+} plr_centred;
+
+static plr_centred centred(const plr_patch_sums *s, const plr_template *t) {
+    const plr_centred c = {central(s->II, s->I, s->I), central(s->IT, s->I, t->sum_T),
+                           central(s->IJx, s->I, t->sum_Jx), central(s->IJy, s->I, t->sum_Jy)};
+    return c;
+}
+
+static plr_real correlation(const plr_centred *c, const plr_template *t) {
+    return c->II > 0 ? c->IT / PLR_SQRT(c->II * t->TT) : PLR_R(0);
+}
+
+plr_real plr_patch_likeness(const plr_image *image, const plr_template *t, const plr_real at[2],
+                            const plr_real A[4]) {
+    plr_grid g;
+    plr_patch_sums s;
+    if (!plr_grid_place(&g, image, at, A))
+        return -1;
+    plr_patch_sum(&s, image, &g, t);
+    const plr_centred c = centred(&s, t);
+    return correlation(&c, t);
+}
+
+/* cov = A (residual variance) H^-1 A^T. */
+static void uncertainty(plr_fit *fit, const plr_template *t, const plr_real A[4], plr_real squares,
+                        plr_real by_det) {
+    const plr_real free = PLR_SAMPLES - 4; /* place, gain, offset */
+    const plr_real var = (squares > 0 ? squares : 0) / free + GREY_VAR;
+    const plr_real xx = var * t->H[2] * by_det, xy = -(var * t->H[1] * by_det);
+    const plr_real yy = var * t->H[0] * by_det;
+    const plr_real a = PLR_FMA(A[0], xx, A[1] * xy), b = PLR_FMA(A[0], xy, A[1] * yy);
+    const plr_real c = PLR_FMA(A[2], xx, A[3] * xy), d = PLR_FMA(A[2], xy, A[3] * yy);
+    fit->cov[0] = PLR_FMA(a, A[0], b * A[1]);
+    fit->cov[1] = PLR_FMA(a, A[2], b * A[3]);
+    fit->cov[2] = PLR_FMA(c, A[2], d * A[3]);
+}
+
+void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, const plr_real A[4],
+                   unsigned most_steps) {
+    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
+    plr_grid g;
+    fit->ended = false;
+    fit->likeness = 0;
+    for (fit->steps = 0; fit->steps < most_steps && !fit->ended;) {
+        plr_patch_sums s;
+        fit->inside = plr_grid_place(&g, image, fit->at, A);
+        if (!fit->inside)
+            return;
+        fit->steps++;
+        plr_patch_sum(&s, image, &g, t);
+        const plr_centred c = centred(&s, t);
+        fit->likeness = correlation(&c, t);
+        if (!(c.II > 0))
+            return;
+        const plr_real gain = PLR_SQRT(t->TT / c.II);
+        const plr_real bx = PLR_FMA(gain, c.IJx, -t->JxT), by = PLR_FMA(gain, c.IJy, -t->JyT);
+        plr_real dx = PLR_FMA(t->H[2], bx, -(t->H[1] * by)) * by_det;
+        plr_real dy = PLR_FMA(t->H[0], by, -(t->H[1] * bx)) * by_det;
+        const plr_real length = PLR_SQRT(PLR_FMA(dx, dx, dy * dy));
+        const plr_real cut = length > STEP_MAX ? STEP_MAX / length : PLR_R(1);
+        dx *= cut, dy *= cut;
+        fit->at[0] = PLR_FMA(-A[0], dx, PLR_FMA(-A[1], dy, fit->at[0]));
+        fit->at[1] = PLR_FMA(-A[2], dx, PLR_FMA(-A[3], dy, fit->at[1]));
+        fit->ended = length < STEP_END;
+        /* |g I~ - T~|^2, less what the step takes off */
+        const plr_real squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(dx, bx, dy * by);
+        uncertainty(fit, t, A, squares, by_det);
+    }
+    fit->inside = plr_grid_place(&g, image, fit->at, A);
+}
