@@ -76,7 +76,8 @@ typedef struct plr_depth {
 } plr_depth;
 
 /* How the camera is expected to have moved since the last pair: the point that was at x is now at
- * R x + p, in the axes of the virtual camera C. A gyro alone knows R (p = 0). */
+ * R x + p, in the axes of the virtual camera C. A gyro alone knows R: with p = 0 each track is expected to go
+ * on drifting beside R as it last did. */
 typedef struct plr_expected {
     plr_pose motion;
     const plr_depth *depths; /* or NULL */
@@ -165,6 +166,7 @@ typedef struct plr_track {
     bool seen;              /* in both pictures of the last pair */
     plr_real at[2];         /* in the left picture, raw px */
     plr_real right[2];      /* in the right one, when it was last found there */
+    plr_real drift[2];      /* from where it was expected to where it was found, px */
     plr_real disparity;     /* in the virtual camera, px, when it was last measured */
     plr_real A[4];          /* from the patch to the left picture as it is now */
     plr_real cov[3];        /* of `at`, xx xy yy, from the last fit */

@@ -169,36 +169,43 @@ static void uncertainty(plr_fit *fit, const plr_template *t, const plr_real A[4]
     fit->cov[2] = PLR_FMA(c, A[2], d * A[3]);
 }
 
+/* One step's d from the place of the grid; false where the picture has no contrast there. */
+static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const plr_template *t,
+                 const plr_real A[4], plr_real d[2]) {
+    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
+    plr_patch_sums s;
+    plr_patch_sum(&s, image, g, t);
+    const plr_centred c = centred(&s, t);
+    fit->likeness = correlation(&c, t);
+    fit->steps++;
+    if (!(c.II > 0))
+        return false;
+    const plr_real gain = PLR_SQRT(t->TT / c.II);
+    const plr_real bx = PLR_FMA(gain, c.IJx, -t->JxT), by = PLR_FMA(gain, c.IJy, -t->JyT);
+    d[0] = PLR_FMA(t->H[2], bx, -(t->H[1] * by)) * by_det;
+    d[1] = PLR_FMA(t->H[0], by, -(t->H[1] * bx)) * by_det;
+    /* |g I~ - T~|^2, less what the step takes off */
+    const plr_real squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(d[0], bx, d[1] * by);
+    uncertainty(fit, t, A, squares, by_det);
+    return true;
+}
+
 void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, const plr_real A[4],
                    unsigned most_steps) {
-    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
     plr_grid g;
+    plr_real d[2];
     fit->ended = false;
     fit->likeness = 0;
     for (fit->steps = 0; fit->steps < most_steps && !fit->ended;) {
-        plr_patch_sums s;
         fit->inside = plr_grid_place(&g, image, fit->at, A);
-        if (!fit->inside)
+        if (!fit->inside || !step(fit, image, &g, t, A, d))
             return;
-        fit->steps++;
-        plr_patch_sum(&s, image, &g, t);
-        const plr_centred c = centred(&s, t);
-        fit->likeness = correlation(&c, t);
-        if (!(c.II > 0))
-            return;
-        const plr_real gain = PLR_SQRT(t->TT / c.II);
-        const plr_real bx = PLR_FMA(gain, c.IJx, -t->JxT), by = PLR_FMA(gain, c.IJy, -t->JyT);
-        plr_real dx = PLR_FMA(t->H[2], bx, -(t->H[1] * by)) * by_det;
-        plr_real dy = PLR_FMA(t->H[0], by, -(t->H[1] * bx)) * by_det;
-        const plr_real length = PLR_SQRT(PLR_FMA(dx, dx, dy * dy));
+        const plr_real length = PLR_SQRT(PLR_FMA(d[0], d[0], d[1] * d[1]));
         const plr_real cut = length > STEP_MAX ? STEP_MAX / length : PLR_R(1);
-        dx *= cut, dy *= cut;
-        fit->at[0] = PLR_FMA(-A[0], dx, PLR_FMA(-A[1], dy, fit->at[0]));
-        fit->at[1] = PLR_FMA(-A[2], dx, PLR_FMA(-A[3], dy, fit->at[1]));
+        d[0] *= cut, d[1] *= cut;
+        fit->at[0] = PLR_FMA(-A[0], d[0], PLR_FMA(-A[1], d[1], fit->at[0]));
+        fit->at[1] = PLR_FMA(-A[2], d[0], PLR_FMA(-A[3], d[1], fit->at[1]));
         fit->ended = length < STEP_END;
-        /* |g I~ - T~|^2, less what the step takes off */
-        const plr_real squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(dx, bx, dy * by);
-        uncertainty(fit, t, A, squares, by_det);
     }
     fit->inside = plr_grid_place(&g, image, fit->at, A);
 }

@@ -19,6 +19,7 @@ typedef struct plr_expected_motion {
     plr_real R[9], p[3]; /* from the last pair to this one, in C */
     plr_real w[3], u[3];
     plr_real right_late; /* s by which the right picture is later than the left one */
+    bool place_known;    /* p is not zero */
     bool known;          /* else R = I and nothing moves within a picture */
 } plr_expected_motion;
 

@@ -6,7 +6,7 @@
 #include "math/small.h"
 #include "vision/patch.h"
 
-enum { STEPS_COARSE = 5, STEPS_FINEST = 10, LEVELS_EXPECTED = 3 };
+enum { STEPS_COARSE = 5, STEPS_FINEST = 10 };
 
 /* Normalised correlation that is enough: with the patch of the birth, with the other picture. */
 #define LIKE PLR_R(0.8)
@@ -23,7 +23,7 @@ static bool find(plr_vision *v, const plr_levels *in, const uint8_t (*patch)[PLR
                  unsigned from, const plr_real A[4], plr_real at[2], plr_fit *fit) {
     plr_template t;
     plr_real start[2] = {at[0], at[1]};
-    fit->inside = fit->ended = false;
+    memset(fit, 0, sizeof *fit);
     for (unsigned level = from + 1; level-- > 0;) {
         if (!plr_template_make(&t, patch[level]))
             continue;
@@ -53,11 +53,6 @@ static unsigned cut(const plr_levels *from, const plr_real at[2],
     return level;
 }
 
-static unsigned coarsest(const plr_expected_motion *m, unsigned levels) {
-    const unsigned most = m->known && levels > LEVELS_EXPECTED ? LEVELS_EXPECTED : levels;
-    return most - 1;
-}
-
 /* --- from picture to picture --- */
 
 static plr_real det(const plr_real A[4]) {
@@ -69,6 +64,11 @@ static bool end(plr_track *t, plr_track_end why) {
     return false;
 }
 
+static bool is_inside(const plr_vision *v, const plr_real at[2]) {
+    return at[0] >= 0 && at[1] >= 0 && at[0] <= (plr_real)(v->width - 1) &&
+           at[1] <= (plr_real)(v->height - 1);
+}
+
 bool plr_track_expect(const plr_vision *v, const plr_expected_motion *m, plr_track *t) {
     plr_real to[2], by[4];
     if (!plr_rig_forward(v, m, t->at, &t->disparity, to, by))
@@ -77,12 +77,24 @@ bool plr_track_expect(const plr_vision *v, const plr_expected_motion *m, plr_tra
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 2; j++)
             t->A[2 * i + j] = PLR_FMA(by[2 * i], A[j], by[2 * i + 1] * A[2 + j]);
-    t->at[0] = to[0], t->at[1] = to[1];
-    const bool inside = to[0] >= 0 && to[1] >= 0 && to[0] <= (plr_real)(v->width - 1) &&
-                        to[1] <= (plr_real)(v->height - 1);
+    if (m->place_known)
+        t->drift[0] = t->drift[1] = 0;
+    for (int i = 0; i < 2; i++)
+        t->at[i] = to[i] + t->drift[i];
     const plr_real d = det(t->A);
-    if (!inside || !(d > PLR_R(0.05) && d < PLR_R(20)))
+    if (!is_inside(v, t->at) || !(d > PLR_R(0.05) && d < PLR_R(20)))
         return end(t, PLR_TRACK_LEFT_VIEW);
+    return true;
+}
+
+bool plr_track_stays(const plr_vision *v, const plr_expected_motion *m, const plr_track *t) {
+    plr_real at[2] = {t->at[0], t->at[1]}, disparity = t->disparity;
+    for (int pair = 0; pair < 2; pair++) {
+        plr_real to[2], A[4];
+        if (!plr_rig_forward(v, m, at, &disparity, to, A) || !is_inside(v, to))
+            return false;
+        at[0] = to[0], at[1] = to[1];
+    }
     return true;
 }
 
@@ -101,13 +113,16 @@ static void cut_anew(plr_vision *v, const plr_scene *s, plr_track *t) {
 
 bool plr_track_follow(plr_vision *v, const plr_scene *s, plr_track *t) {
     plr_fit fit;
+    const plr_real expected[2] = {t->at[0], t->at[1]};
     const bool found = find(v, &s->side[PLR_LEFT], (const uint8_t(*)[PLR_PATCH_BYTES])t->patch,
-                            coarsest(&s->motion, t->levels), t->A, t->at, &fit);
+                            t->levels - 1U, t->A, t->at, &fit);
     if (!found)
         return end(t, !fit.inside    ? PLR_TRACK_LEFT_VIEW
                       : !fit.ended ? PLR_TRACK_MOVED
                                    : PLR_TRACK_UNLIKE);
     memcpy(t->cov, fit.cov, sizeof fit.cov);
+    for (int i = 0; i < 2; i++)
+        t->drift[i] += t->at[i] - expected[i];
     t->likeness = fit.likeness;
     const plr_real d = det(t->A);
     if (d < SMALLEST || d > LARGEST)
@@ -202,7 +217,7 @@ static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t,
     return c.best > LIKE_SEARCH && c.second < SECOND_BEST * c.best;
 }
 
-bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool search) {
+bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool birth) {
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
     const uint8_t(*const kept)[PLR_PATCH_BYTES] = (const uint8_t(*)[PLR_PATCH_BYTES])patch;
     plr_real at[2], A[4];
@@ -210,11 +225,11 @@ bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool searc
     if (levels == 0)
         return false;
     const unsigned level = search_level(v, levels), from = level > 0 ? 1 : 0;
-    if (t->age > 0 && plr_rig_across(v, &s->motion, t->at, t->disparity, at, A) &&
-        fit_right(v, s, kept, from, A, t, at))
-        return true;
+    if (!birth)
+        return plr_rig_across(v, &s->motion, t->at, t->disparity, at, A) &&
+               fit_right(v, s, kept, from, A, t, at);
     plr_real disparity;
-    if (!search || !search_line(v, s, t, kept[level], level, false, &disparity) ||
+    if (!search_line(v, s, t, kept[level], level, false, &disparity) ||
         !plr_rig_across(v, &s->motion, t->at, disparity, at, A))
         return false;
     t->disparity = disparity;

@@ -13,7 +13,7 @@
 enum {
     READY = 0x45594553,       /* "EYES" */
     DISPARITY_SHARE = 6,      /* of the width */
-    SEARCHES = 8,             /* a pair, of tracks that have lost their right half */
+    MORE_TRIES = 8,           /* of births, beside twice as many as are wanted */
     MIRROR_TRIES = 20,        /* births before which swapped sides are asked for */
     SWAPPED_AFTER = 10        /* finds on the wrong side */
 };
@@ -105,6 +105,7 @@ static void take_motion(const plr_vision *v, const plr_expected *e, const plr_pi
         m->u[i] = m->p[i] * rate;
     }
     m->known = true;
+    m->place_known = plr_dot3(m->p, m->p) > 0;
 }
 
 /* The depth that the caller knows, as a disparity. */
@@ -178,15 +179,13 @@ static void follow(plr_vision *v, const plr_scene *s, const plr_expected *e) {
 }
 
 static void match(plr_vision *v, const plr_scene *s) {
-    unsigned searches = SEARCHES;
     for (unsigned i = 0; i < v->track_count; i++) {
         plr_track *t = &v->tracks[i];
-        t->seen = plr_track_match(v, s, t, searches > 0);
+        t->seen = plr_track_match(v, s, t, false);
         if (t->seen) {
             t->misses = 0;
             v->report.observed++;
         } else {
-            searches -= searches > 0;
             miss(t, PLR_TRACK_NO_RIGHT);
         }
     }
@@ -212,6 +211,8 @@ static bool begin(plr_vision *v, const plr_scene *s, const plr_real at[2]) {
         return false;
     }
     v->proper += v->proper < MIRROR_TRIES;
+    if (!plr_track_stays(v, &s->motion, t))
+        return false;
     t->seen = true;
     return true;
 }
@@ -221,7 +222,7 @@ static void fill(plr_vision *v, const plr_scene *s) {
         return;
     plr_corners_find(v, &s->side[PLR_LEFT]);
     const plr_real apart = (plr_real)plr_cells_of(v->width, v->height).side_px / 2;
-    unsigned tries = 2U * (unsigned)(v->wanted - v->track_count) + SEARCHES;
+    unsigned tries = 2U * (unsigned)(v->wanted - v->track_count) + MORE_TRIES;
     for (unsigned i = 0; i < v->corner_count && v->track_count < v->wanted && tries > 0; i++) {
         const plr_real at[2] = {(plr_real)v->corners[i].u, (plr_real)v->corners[i].v};
         if (is_taken(v, at, apart))
