@@ -37,8 +37,9 @@ typedef enum plr_lens_model {
 
 /* One camera. Pixel (0, 0) is the middle of the first pixel. */
 typedef struct plr_lens {
-    uint8_t model;              /* plr_lens_model */
-    uint16_t width_px, height_px; /* of the pictures for which these numbers hold: 48 to 4096 each */
+    uint8_t model; /* plr_lens_model */
+    uint16_t width_px,
+        height_px; /* of the pictures for which these numbers hold: 48 to 4096 each */
     double fx_px, fy_px, cx_px, cy_px;
     double k[8];
 } plr_lens;
@@ -47,11 +48,13 @@ typedef struct plr_lens {
 typedef struct plr_rig {
     plr_lens left, right; /* of equal size */
     plr_pose T_RL;        /* left camera to right camera: x_R = R x_L + p, m */
-    double row_time_s;    /* from one row to the next of a rolling shutter; 0: global. Points are moved to
+    double
+        row_time_s; /* from one row to the next of a rolling shutter; 0: global. Points are moved to
                              the time of the middle row by the expected motion */
     uint16_t disparity_max_px; /* nearest point, in the virtual camera; 0: a sixth of the width */
-    uint16_t tracks;      /* points to follow, 1 to PLR_VISION_TRACKS; 0: that many */
-    double fx_px, fy_px, cx_px, cy_px; /* the virtual camera; fx 0: chosen so that its middle shows what
+    uint16_t tracks;           /* points to follow, 1 to PLR_VISION_TRACKS; 0: that many */
+    double fx_px, fy_px, cx_px,
+        cy_px; /* the virtual camera; fx 0: chosen so that its middle shows what
                                           the middles of both pictures show */
 } plr_rig;
 
@@ -91,9 +94,10 @@ typedef enum plr_track_end {
     PLR_TRACK_LEFT_VIEW = 1, /* it left the left picture, or is expected outside it */
     PLR_TRACK_UNLIKE = 2,    /* what is there now does not look like the patch of its birth */
     PLR_TRACK_MOVED = 3,     /* the fit led farther away than it can be trusted */
-    PLR_TRACK_NO_RIGHT = 4,  /* not found in the right picture, PLR_VISION_MISSES times in succession */
-    PLR_TRACK_CROWDED = 5,   /* an older track follows the same point */
-    PLR_TRACK_UNSEEN = 6,    /* the pictures could not be used for PLR_VISION_MISSES pairs */
+    PLR_TRACK_NO_RIGHT =
+        4, /* not found in the right picture, PLR_VISION_MISSES times in succession */
+    PLR_TRACK_CROWDED = 5, /* an older track follows the same point */
+    PLR_TRACK_UNSEEN = 6,  /* the pictures could not be used for PLR_VISION_MISSES pairs */
     PLR_TRACK_ENDS = 7
 } plr_track_end;
 
@@ -102,8 +106,9 @@ enum { PLR_VISION_MISSES = 5 };
 /* Of each observation that is handed out, in the same order. */
 typedef struct plr_sight {
     uint32_t id;
-    uint16_t age;   /* pairs since its birth, 0 in the first */
-    float sigma_px; /* of its pixels in the virtual camera: root of the mean variance of uL, vL and uR, from
+    uint16_t age; /* pairs since its birth, 0 in the first */
+    float
+        sigma_px; /* of its pixels in the virtual camera: root of the mean variance of uL, vL and uR, from
                        the fits themselves: contrast, residuals, and what a patch cut anew has cost */
     float likeness; /* normalised correlation with the patch of its birth, at most 1 */
 } plr_sight;
@@ -116,27 +121,31 @@ typedef struct plr_ended_track {
 
 /* What is wrong with a picture: bits. */
 typedef enum plr_picture_fault {
-    PLR_PICTURE_DARK = 1 << 0,     /* nearly black: a lens cap, no light, an exposure far too short */
-    PLR_PICTURE_BRIGHT = 1 << 1,   /* nearly white: overexposed */
-    PLR_PICTURE_FLAT = 1 << 2,     /* no contrast anywhere: fog, a covered lens, a wall without texture */
-    PLR_PICTURE_REPEATED = 1 << 3, /* the last one again. If both halves repeat, so do the observations, and
+    PLR_PICTURE_DARK = 1 << 0,   /* nearly black: a lens cap, no light, an exposure far too short */
+    PLR_PICTURE_BRIGHT = 1 << 1, /* nearly white: overexposed */
+    PLR_PICTURE_FLAT =
+        1 << 2, /* no contrast anywhere: fog, a covered lens, a wall without texture */
+    PLR_PICTURE_REPEATED =
+        1 << 3, /* the last one again. If both halves repeat, so do the observations, and
                                       the filter judges; if one does, the pair is none and shows nothing */
     PLR_PICTURE_UNUSABLE = PLR_PICTURE_DARK | PLR_PICTURE_BRIGHT | PLR_PICTURE_FLAT
 } plr_picture_fault;
 
 /* What happened to one pair. */
 typedef struct plr_vision_report {
-    plr_time_ns t_ns;     /* of the frame: the middle row of the left picture */
-    uint8_t left, right;  /* bits of plr_picture_fault */
-    bool swapped;         /* points are found where the other side should be: left and right are exchanged */
-    uint16_t followed;    /* tracks that were found again in the left picture */
-    uint16_t observed;    /* and in the right one: these, and the born, are handed out */
+    plr_time_ns t_ns;    /* of the frame: the middle row of the left picture */
+    uint8_t left, right; /* bits of plr_picture_fault */
+    bool
+        swapped; /* points are found where the other side should be: left and right are exchanged */
+    uint16_t followed; /* tracks that were found again in the left picture */
+    uint16_t observed; /* and in the right one: these, and the born, are handed out */
     uint16_t born;
-    uint16_t corners;     /* tried as births */
-    uint16_t cut_anew;    /* patches that had become too different from those of their births */
-    uint16_t ended;       /* tracks, of plr_vision.ended */
-    uint16_t steps;       /* of fits, a measure of the work */
-    float halves_apart_s; /* by how much later than its time the right picture seems to have been taken, from
+    uint16_t corners;  /* tried as births */
+    uint16_t cut_anew; /* patches that had become too different from those of their births */
+    uint16_t ended;    /* tracks, of plr_vision.ended */
+    uint16_t steps;    /* of fits, a measure of the work */
+    float
+        halves_apart_s; /* by how much later than its time the right picture seems to have been taken, from
                              rows that differ as the camera pitches and rolls, */
     float halves_sigma_s; /* and the standard deviation of that; 0: nothing is known yet */
 } plr_vision_report;
@@ -150,8 +159,8 @@ typedef struct plr_optics {
 } plr_optics;
 
 enum {
-    PLR_PATCH_SIDE = 9,                         /* of what is compared, px */
-    PLR_PATCH_KEPT = PLR_PATCH_SIDE + 2,        /* with a margin for its gradients */
+    PLR_PATCH_SIDE = 9,                  /* of what is compared, px */
+    PLR_PATCH_KEPT = PLR_PATCH_SIDE + 2, /* with a margin for its gradients */
     PLR_PATCH_BYTES = PLR_PATCH_KEPT * PLR_PATCH_KEPT,
     PLR_VISION_CELLS = 20 * 20 /* most cells, of which each can show a corner */
 };
@@ -160,25 +169,25 @@ enum {
 typedef struct plr_track {
     uint32_t id;
     uint16_t age;
-    uint8_t misses;         /* pairs in succession without an observation */
-    uint8_t why;            /* plr_track_end, once it has ended */
-    uint8_t levels;         /* of its patch: near the edge a coarse one does not fit */
-    bool seen;              /* in both pictures of the last pair */
-    plr_real at[2];         /* in the left picture, raw px */
-    plr_real right[2];      /* in the right one, when it was last found there */
-    plr_real drift[2];      /* from where it was expected to where it was found, px */
-    plr_real disparity;     /* in the virtual camera, px, when it was last measured */
-    plr_real A[4];          /* from the patch to the left picture as it is now */
-    plr_real cov[3];        /* of `at`, xx xy yy, from the last fit */
-    plr_real var_right;     /* of uR beside uL */
-    plr_real var_cut;       /* what cutting anew has cost, px^2 */
+    uint8_t misses;     /* pairs in succession without an observation */
+    uint8_t why;        /* plr_track_end, once it has ended */
+    uint8_t levels;     /* of its patch: near the edge a coarse one does not fit */
+    bool seen;          /* in both pictures of the last pair */
+    plr_real at[2];     /* in the left picture, raw px */
+    plr_real right[2];  /* in the right one, when it was last found there */
+    plr_real drift[2];  /* from where it was expected to where it was found, px */
+    plr_real disparity; /* in the virtual camera, px, when it was last measured */
+    plr_real A[4];      /* from the patch to the left picture as it is now */
+    plr_real cov[3];    /* of `at`, xx xy yy, from the last fit */
+    plr_real var_right; /* of uR beside uL */
+    plr_real var_cut;   /* what cutting anew has cost, px^2 */
     plr_real likeness;
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
 } plr_track;
 
 /* A corner that could be followed. */
 typedef struct plr_corner {
-    float score; /* smaller eigenvalue of the structure tensor */
+    float score;   /* smaller eigenvalue of the structure tensor */
     uint16_t u, v; /* in the left picture */
 } plr_corner;
 
@@ -249,8 +258,8 @@ plr_status plr_vision_forget(plr_vision *v);
  * size than the rig's: they are not those of its calibration; PLR_E_TIME not later than the last pair, or
  * halves more than a quarter second apart; PLR_E_NOT_FINITE, PLR_E_RANGE the expected motion is not finite,
  * no rotation, or more than 100 m. After an error nothing has changed. */
-plr_status plr_vision_track(plr_vision *v, const plr_picture_pair *pair, const plr_expected *expected,
-                            plr_frame *frame);
+plr_status plr_vision_track(plr_vision *v, const plr_picture_pair *pair,
+                            const plr_expected *expected, plr_frame *frame);
 
 #ifdef __cplusplus
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "vision/check.h"
+#include "vision/watch.h"
 
 #include "math/finite.h"
 
@@ -11,11 +11,11 @@ enum { SIDE_MIN = 48, SIDE_MAX = 4096 };
 #define MOTION_MAX_M   100.0
 #define ORTHONORMAL    1e-3
 
-bool plr_check_rotation(const double R[9]) {
+static bool is_rotation(const double R[9]) {
     for (int i = 0; i < 3; i++)
         for (int j = i; j < 3; j++) {
-            const double dot = R[3 * i] * R[3 * j] + R[3 * i + 1] * R[3 * j + 1] +
-                               R[3 * i + 2] * R[3 * j + 2];
+            const double dot =
+                R[3 * i] * R[3 * j] + R[3 * i + 1] * R[3 * j + 1] + R[3 * i + 2] * R[3 * j + 2];
             const double off = dot - (i == j ? 1.0 : 0.0);
             if (!(off < ORTHONORMAL && off > -ORTHONORMAL))
                 return false;
@@ -51,7 +51,7 @@ plr_status plr_check_rig(const plr_rig *rig) {
         !plr_all_finite(&rig->fx_px, 4))
         return PLR_E_NOT_FINITE;
     const bool own = rig->fx_px != 0;
-    if (!plr_check_rotation(rig->T_RL.R) || !plr_all_within(rig->T_RL.p, 3, FAR) ||
+    if (!is_rotation(rig->T_RL.R) || !plr_all_within(rig->T_RL.p, 3, FAR) ||
         (own && (rig->fx_px < 1 || rig->fy_px < 1 || !plr_all_within(&rig->fx_px, 4, FAR))))
         return PLR_E_CALIBRATION;
     return PLR_OK;
@@ -79,7 +79,7 @@ plr_status plr_check_expected(const plr_expected *e) {
         return PLR_E_ARGUMENT;
     if (!plr_all_finite(e->motion.R, 9) || !plr_all_finite(e->motion.p, 3))
         return PLR_E_NOT_FINITE;
-    if (!plr_check_rotation(e->motion.R) || !plr_all_within(e->motion.p, 3, MOTION_MAX_M))
+    if (!is_rotation(e->motion.R) || !plr_all_within(e->motion.p, 3, MOTION_MAX_M))
         return PLR_E_RANGE;
     return PLR_OK;
 }

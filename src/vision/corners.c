@@ -6,11 +6,12 @@
 #include "math/small.h"
 
 enum {
-    CELLS_LONG = 19,    /* along the longer side */
-    WIDEST = 400,       /* px of the level in which corners are looked for, if there is a coarser one */
-    MOST_COLUMNS = 32,  /* of a cell, every second px, with its margin; of a larger cell the left part */
-    BOX = 4,            /* samples each way, of every second px: 7 x 7 px */
-    BORDER = 6          /* px of the level beside which no patch fits */
+    CELLS_LONG = 19, /* along the longer side */
+    WIDEST = 400, /* px of the level in which corners are looked for, if there is a coarser one */
+    MOST_COLUMNS =
+        32,    /* of a cell, every second px, with its margin; of a larger cell the left part */
+    BOX = 4,   /* samples each way, of every second px: 7 x 7 px */
+    BORDER = 6 /* px of the level beside which no patch fits */
 };
 
 /* A corner's place is then sure to half a pixel beside a noise of one grey level: 16 samples of Sobel's
@@ -126,24 +127,15 @@ static void mark_taken(const plr_vision *v, const plr_cells *c, uint8_t taken[PL
     }
 }
 
-/* Shell's way: no recursion, and few elements. Equal scores keep the order of their places. */
+/* Equal scores keep the order of their cells. */
 static void strongest_first(plr_corner *c, unsigned n) {
-    for (unsigned gap = 121; gap > 0; gap /= 3)
-        for (unsigned i = gap; i < n; i++) {
-            const plr_corner moving = c[i];
-            unsigned j = i;
-            for (; j >= gap; j -= gap) {
-                const plr_corner *other = &c[j - gap];
-                const bool before = other->score > moving.score ||
-                                    (other->score >= moving.score &&
-                                     (other->v < moving.v ||
-                                      (other->v == moving.v && other->u < moving.u)));
-                if (before)
-                    break;
-                c[j] = *other;
-            }
-            c[j] = moving;
-        }
+    for (unsigned i = 1; i < n; i++) {
+        const plr_corner moving = c[i];
+        unsigned j = i;
+        for (; j > 0 && c[j - 1].score < moving.score; j--)
+            c[j] = c[j - 1];
+        c[j] = moving;
+    }
 }
 
 void plr_corners_find(plr_vision *v, const plr_levels *left) {

@@ -57,9 +57,9 @@ static bool undistort(const plr_real k[8], const plr_real d[2], plr_real x[2]) {
 /* theta (1 + k1 theta^2 + ... + k4 theta^8), and its derivative. */
 static plr_real bent(const plr_real k[8], plr_real theta, plr_real *slope) {
     const plr_real t2 = theta * theta;
-    *slope = PLR_FMA(
-        t2,
-        PLR_FMA(t2, PLR_FMA(t2, PLR_FMA(t2, 9 * k[3], 7 * k[2]), 5 * k[1]), 3 * k[0]), PLR_R(1));
+    *slope =
+        PLR_FMA(t2, PLR_FMA(t2, PLR_FMA(t2, PLR_FMA(t2, 9 * k[3], 7 * k[2]), 5 * k[1]), 3 * k[0]),
+                PLR_R(1));
     return theta *
            PLR_FMA(t2, PLR_FMA(t2, PLR_FMA(t2, PLR_FMA(t2, k[3], k[2]), k[1]), k[0]), PLR_R(1));
 }

@@ -10,6 +10,8 @@ enum { HALF = PLR_PATCH_SIDE / 2, KEPT_HALF = PLR_PATCH_KEPT / 2, FRACTION = 16,
 #define STEP_END PLR_R(0.02) /* px */
 /* Grey levels' noise that no residual may claim to be below: rounding to whole levels, twice. */
 #define GREY_VAR PLR_R(2.0 / 12 * PLR_GREY * PLR_GREY)
+/* What a patch that fits exactly is still off by: interpolation, aliasing, rounded weights; px^2. */
+#define FLOOR_VAR PLR_R(0.08 * 0.08)
 /* A patch whose place this noise alone makes uncertain by half a pixel has no contrast. */
 #define WEAKEST (GREY_VAR * PLR_R(4))
 
@@ -113,20 +115,6 @@ void plr_patch_sum(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
     s->I = I, s->II = II, s->IT = IT, s->IJx = IJx, s->IJy = IJy;
 }
 
-void plr_patch_sum_plain(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
-                         const plr_template *t) {
-    int64_t I = 0, II = 0, IT = 0, IJx = 0, IJy = 0;
-    for (int k = 0; k < PLR_SAMPLES; k++) {
-        const int32_t i = k % PLR_PATCH_SIDE - HALF, j = k / PLR_PATCH_SIDE - HALF;
-        const int32_t v = sample(image, g->x + g->A[0] * i + g->A[1] * j,
-                                 g->y + g->A[2] * i + g->A[3] * j);
-        I += v, II += (int64_t)v * v;
-        IT += (int64_t)v * t->T[k], IJx += (int64_t)v * t->Jx[k], IJy += (int64_t)v * t->Jy[k];
-    }
-    s->I = (int32_t)I, s->II = (int32_t)II, s->IT = (int32_t)IT;
-    s->IJx = (int32_t)IJx, s->IJy = (int32_t)IJy;
-}
-
 /* --- fits --- */
 
 /* The sums without their means. */
@@ -155,23 +143,32 @@ plr_real plr_patch_likeness(const plr_image *image, const plr_template *t, const
     return correlation(&c, t);
 }
 
-/* cov = A (residual variance) H^-1 A^T. */
-static void uncertainty(plr_fit *fit, const plr_template *t, const plr_real A[4], plr_real squares,
-                        plr_real by_det) {
-    const plr_real free = PLR_SAMPLES - 4; /* place, gain, offset */
-    const plr_real var = (squares > 0 ? squares : 0) / free + GREY_VAR;
-    const plr_real xx = var * t->H[2] * by_det, xy = -(var * t->H[1] * by_det);
-    const plr_real yy = var * t->H[0] * by_det;
-    const plr_real a = PLR_FMA(A[0], xx, A[1] * xy), b = PLR_FMA(A[0], xy, A[1] * yy);
-    const plr_real c = PLR_FMA(A[2], xx, A[3] * xy), d = PLR_FMA(A[2], xy, A[3] * yy);
-    fit->cov[0] = PLR_FMA(a, A[0], b * A[1]);
-    fit->cov[1] = PLR_FMA(a, A[2], b * A[3]);
-    fit->cov[2] = PLR_FMA(c, A[2], d * A[3]);
+/* cov = A (2 var S^-1 H S^-1 + floor I) A^T, var the noise of one picture, S = H less what noise adds to the
+ * squares of J. Interpolation has averaged a part of the noise out of the residuals: they have 1.44 var. */
+static void uncertainty(plr_fit *fit, const plr_template *t, const plr_real A[4],
+                        plr_real squares) {
+    const plr_real residual = (squares > 0 ? squares : 0) / (PLR_SAMPLES - 4) + GREY_VAR;
+    const plr_real var = residual / PLR_R(1.44), *H = t->H;
+    const plr_real weaker = PLR_FMA(H[0], H[2], -(H[1] * H[1])) / (H[0] + H[2]);
+    const plr_real noise = PLR_SAMPLES / 2 * var, most = weaker / 2;
+    const plr_real less = noise < most ? noise : most;
+    const plr_real a = H[0] - less, c = H[2] - less, b = H[1];
+    const plr_real by_det = 1 / PLR_FMA(a, c, -(b * b));
+    const plr_real S[3] = {c * by_det, -(b * by_det), a * by_det};
+    const plr_real p = PLR_FMA(S[0], H[0], S[1] * H[1]), q = PLR_FMA(S[0], H[1], S[1] * H[2]);
+    const plr_real r = PLR_FMA(S[1], H[0], S[2] * H[1]), s = PLR_FMA(S[1], H[1], S[2] * H[2]);
+    const plr_real xx = PLR_FMA(2 * var, PLR_FMA(p, S[0], q * S[1]), FLOOR_VAR);
+    const plr_real xy = 2 * var * PLR_FMA(p, S[1], q * S[2]);
+    const plr_real yy = PLR_FMA(2 * var, PLR_FMA(r, S[1], s * S[2]), FLOOR_VAR);
+    const plr_real e = PLR_FMA(A[0], xx, A[1] * xy), f = PLR_FMA(A[0], xy, A[1] * yy);
+    fit->cov[0] = PLR_FMA(e, A[0], f * A[1]);
+    fit->cov[1] = PLR_FMA(e, A[2], f * A[3]);
+    fit->cov[2] = PLR_FMA(PLR_FMA(A[2], xx, A[3] * xy), A[2], PLR_FMA(A[2], xy, A[3] * yy) * A[3]);
 }
 
 /* One step's d from the place of the grid; false where the picture has no contrast there. */
 static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const plr_template *t,
-                 const plr_real A[4], plr_real d[2]) {
+                 plr_real d[2], plr_real *squares) {
     const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
     plr_patch_sums s;
     plr_patch_sum(&s, image, g, t);
@@ -185,20 +182,19 @@ static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const 
     d[0] = PLR_FMA(t->H[2], bx, -(t->H[1] * by)) * by_det;
     d[1] = PLR_FMA(t->H[0], by, -(t->H[1] * bx)) * by_det;
     /* |g I~ - T~|^2, less what the step takes off */
-    const plr_real squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(d[0], bx, d[1] * by);
-    uncertainty(fit, t, A, squares, by_det);
+    *squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(d[0], bx, d[1] * by);
     return true;
 }
 
 void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, const plr_real A[4],
                    unsigned most_steps) {
     plr_grid g;
-    plr_real d[2];
+    plr_real d[2], squares = 0;
     fit->ended = false;
     fit->likeness = 0;
     for (fit->steps = 0; fit->steps < most_steps && !fit->ended;) {
         fit->inside = plr_grid_place(&g, image, fit->at, A);
-        if (!fit->inside || !step(fit, image, &g, t, A, d))
+        if (!fit->inside || !step(fit, image, &g, t, d, &squares))
             return;
         const plr_real length = PLR_SQRT(PLR_FMA(d[0], d[0], d[1] * d[1]));
         const plr_real cut = length > STEP_MAX ? STEP_MAX / length : PLR_R(1);
@@ -208,4 +204,5 @@ void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, 
         fit->ended = length < STEP_END;
     }
     fit->inside = plr_grid_place(&g, image, fit->at, A);
+    uncertainty(fit, t, A, squares);
 }

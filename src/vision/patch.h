@@ -60,10 +60,6 @@ bool plr_grid_place(plr_grid *g, const plr_image *image, const plr_real at[2], c
 void plr_patch_sum(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
                    const plr_template *t);
 
-/* The same by its definition, sample by sample. What tests hold it against. */
-void plr_patch_sum_plain(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
-                         const plr_template *t);
-
 /* Normalised correlation at a place; -1 outside. */
 plr_real plr_patch_likeness(const plr_image *image, const plr_template *t, const plr_real at[2],
                             const plr_real A[4]);

@@ -18,40 +18,19 @@ static unsigned clamped(int i, unsigned count) {
     return i < 0 ? 0 : (unsigned)i < count ? (unsigned)i : count - 1;
 }
 
-void plr_pyramid_halve_plain(const plr_image *in, uint8_t *out) {
-    static const unsigned weight[4] = {1, 3, 3, 1};
-    const unsigned width = in->width / 2U, height = in->height / 2U;
-    for (unsigned y = 0; y < height; y++)
-        for (unsigned x = 0; x < width; x++) {
-            unsigned sum = 32;
-            for (int j = 0; j < 4; j++)
-                for (int i = 0; i < 4; i++)
-                    sum += weight[j] * weight[i] *
-                           in->pixels[clamped((int)(2 * y) - 1 + j, in->height) * in->stride +
-                                      clamped((int)(2 * x) - 1 + i, in->width)];
-            out[y * width + x] = (uint8_t)(sum / 64);
-        }
-}
-
-/* Columns that are summed at once: so many that a row of sums stays near the processor. */
+/* Columns of a level that are made at once: their sums stay near the processor. */
 enum { STRIP = 64 };
 
-/* Of columns first - 1 to first + 2 n of four rows, 1 3 3 1: sums of n + 1 pairs fit in 16 bits. */
-static void sum_rows(const uint8_t *const row[4], unsigned width, int first, unsigned n,
-                     uint16_t *sum) {
-    for (unsigned i = 0; i < n; i++) {
-        const unsigned x = clamped(first + (int)i, width);
-        sum[i] = (uint16_t)(row[0][x] + row[3][x] + 3 * (row[1][x] + row[2][x]));
-    }
-}
-
-/* The same where no column lies outside. */
-static void sum_rows_inside(const uint8_t *const row[4], unsigned first, unsigned n,
-                            uint16_t *restrict sum) {
-    const uint8_t *a = row[0] + first, *b = row[1] + first, *c = row[2] + first,
-                  *d = row[3] + first;
-    for (unsigned i = 0; i < n; i++)
-        sum[i] = (uint16_t)(a[i] + d[i] + 3 * (b[i] + c[i]));
+/* sum[i] <- 1 3 3 1 down column first + i, n of them; beyond the edges the last one is repeated. */
+static void sum_columns(const uint8_t *const row[4], int width, int first, int n, uint16_t *sum) {
+    const uint8_t *a = row[0], *b = row[1], *c = row[2], *d = row[3];
+    const int begin = first < 0 ? -first : 0, end = first + n > width ? width - first : n;
+    for (int i = begin; i < end; i++)
+        sum[i] = (uint16_t)(a[first + i] + d[first + i] + 3 * (b[first + i] + c[first + i]));
+    for (int i = 0; i < begin; i++)
+        sum[i] = sum[begin];
+    for (int i = end; i < n; i++)
+        sum[i] = sum[end - 1];
 }
 
 void plr_pyramid_halve(const plr_image *in, uint8_t *out) {
@@ -63,10 +42,7 @@ void plr_pyramid_halve(const plr_image *in, uint8_t *out) {
             row[j] = in->pixels + clamped((int)(2 * y) - 1 + j, in->height) * in->stride;
         for (unsigned x = 0; x < width; x += STRIP) {
             const unsigned n = width - x < STRIP ? width - x : STRIP;
-            if (x > 0 && 2 * (x + n) + 1 <= in->width)
-                sum_rows_inside(row, 2 * x - 1, 2 * n + 2, sum);
-            else
-                sum_rows(row, in->width, (int)(2 * x) - 1, 2 * n + 2, sum);
+            sum_columns(row, in->width, (int)(2 * x) - 1, (int)(2 * n + 2), sum);
             for (unsigned i = 0; i < n; i++) {
                 const uint16_t *s = sum + 2 * i;
                 out[y * width + x + i] =

@@ -30,9 +30,6 @@ unsigned plr_pyramid_levels(unsigned width, unsigned height);
 /* out (width/2 x height/2, without gaps) <- in, halved. */
 void plr_pyramid_halve(const plr_image *in, uint8_t *out);
 
-/* The same by its definition: sixteen products a pixel, edges repeated. What tests hold it against. */
-void plr_pyramid_halve_plain(const plr_image *in, uint8_t *out);
-
 /* All levels of a picture, the coarser ones into `store` (PLR_VISION_PIXELS / 3). */
 void plr_pyramid_build(plr_levels *l, const plr_picture *picture, unsigned count, uint8_t *store);
 

@@ -136,8 +136,8 @@ static bool moves_within(const plr_vision *v, const plr_expected_motion *m, int 
     return m->known && (v->row_time > 0 || (side == PLR_RIGHT && plr_abs(m->right_late) > 0));
 }
 
-bool plr_rig_point(const plr_vision *v, const plr_expected_motion *m, int side, const plr_real px[2],
-                   plr_real depth, plr_real X[3]) {
+bool plr_rig_point(const plr_vision *v, const plr_expected_motion *m, int side,
+                   const plr_real px[2], plr_real depth, plr_real X[3]) {
     plr_real ray[3];
     if (!plr_lens_ray(&v->optics[side], px, ray))
         return false;
@@ -225,7 +225,8 @@ bool plr_rig_forward(const plr_vision *v, const plr_expected_motion *m, const pl
     if (!carry_patch(v, m, PLR_LEFT, px, depth, to, A) ||
         !plr_rig_point(v, m, PLR_LEFT, px, depth, X))
         return false;
-    *disparity *= depth / PLR_FMA(X[2], m->R[8], PLR_FMA(X[1], m->R[7], PLR_FMA(X[0], m->R[6], m->p[2])));
+    *disparity *=
+        depth / PLR_FMA(X[2], m->R[8], PLR_FMA(X[1], m->R[7], PLR_FMA(X[0], m->R[6], m->p[2])));
     return true;
 }
 

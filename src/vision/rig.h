@@ -28,8 +28,8 @@ typedef struct plr_expected_motion {
 plr_status plr_rig_prepare(plr_vision *v, const plr_rig *rig);
 
 /* The point at `depth` (m, along C's z) that a raw pixel of a side shows, in C, at the time of the frame. */
-bool plr_rig_point(const plr_vision *v, const plr_expected_motion *m, int side, const plr_real px[2],
-                   plr_real depth, plr_real X[3]);
+bool plr_rig_point(const plr_vision *v, const plr_expected_motion *m, int side,
+                   const plr_real px[2], plr_real depth, plr_real X[3]);
 
 /* The raw pixel of a side that shows the point X. */
 bool plr_rig_pixel(const plr_vision *v, const plr_expected_motion *m, int side, const plr_real X[3],

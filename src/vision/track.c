@@ -117,7 +117,7 @@ bool plr_track_follow(plr_vision *v, const plr_scene *s, plr_track *t) {
     const bool found = find(v, &s->side[PLR_LEFT], (const uint8_t(*)[PLR_PATCH_BYTES])t->patch,
                             t->levels - 1U, t->A, t->at, &fit);
     if (!found)
-        return end(t, !fit.inside    ? PLR_TRACK_LEFT_VIEW
+        return end(t, !fit.inside  ? PLR_TRACK_LEFT_VIEW
                       : !fit.ended ? PLR_TRACK_MOVED
                                    : PLR_TRACK_UNLIKE);
     memcpy(t->cov, fit.cov, sizeof fit.cov);
@@ -194,9 +194,8 @@ static unsigned search_level(const plr_vision *v, unsigned levels) {
 }
 
 /* Where along the epipolar line the patch is likeliest; `mirror`: on the other side of infinity. */
-static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t,
-                        const uint8_t *patch, unsigned level, bool mirror,
-                        plr_real *disparity) {
+static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t, const uint8_t *patch,
+                        unsigned level, bool mirror, plr_real *disparity) {
     plr_template template;
     plr_candidates c = {-1, -1000, -1};
     plr_real infinity[2], A[4];

@@ -4,18 +4,17 @@
 #include <string.h>
 
 #include "math/small.h"
-#include "vision/check.h"
 #include "vision/corners.h"
 #include "vision/rig.h"
 #include "vision/track.h"
 #include "vision/watch.h"
 
 enum {
-    READY = 0x45594553,       /* "EYES" */
-    DISPARITY_SHARE = 6,      /* of the width */
-    MORE_TRIES = 8,           /* of births, beside twice as many as are wanted */
-    MIRROR_TRIES = 20,        /* births before which swapped sides are asked for */
-    SWAPPED_AFTER = 10        /* finds on the wrong side */
+    READY = 0x45594553,  /* "EYES" */
+    DISPARITY_SHARE = 6, /* of the width */
+    MORE_TRIES = 8,      /* of births, beside twice as many as are wanted */
+    MIRROR_TRIES = 20,   /* births before which swapped sides are asked for */
+    SWAPPED_AFTER = 10   /* finds on the wrong side */
 };
 
 #define CROWDED_PX PLR_R(3)
@@ -28,7 +27,8 @@ static plr_vision_sizes own_sizes(void) {
     return sizes;
 }
 
-plr_status plr_vision_init_sized(plr_vision *v, const plr_rig *rig, const plr_vision_sizes *caller) {
+plr_status plr_vision_init_sized(plr_vision *v, const plr_rig *rig,
+                                 const plr_vision_sizes *caller) {
     const plr_vision_sizes own = own_sizes();
     if (!v || !rig || !caller)
         return PLR_E_ARGUMENT;
@@ -41,8 +41,8 @@ plr_status plr_vision_init_sized(plr_vision *v, const plr_rig *rig, const plr_vi
     v->width = rig->left.width_px, v->height = rig->left.height_px;
     v->levels = (uint8_t)plr_pyramid_levels(v->width, v->height);
     v->wanted = rig->tracks ? rig->tracks : PLR_VISION_TRACKS;
-    v->disparity_max = rig->disparity_max_px ? rig->disparity_max_px
-                                             : (uint16_t)(v->width / DISPARITY_SHARE);
+    v->disparity_max =
+        rig->disparity_max_px ? rig->disparity_max_px : (uint16_t)(v->width / DISPARITY_SHARE);
     v->row_time = (plr_real)rig->row_time_s;
     status = plr_rig_prepare(v, rig);
     v->ready = status == PLR_OK ? READY : 0;
@@ -290,8 +290,8 @@ static void look(plr_vision *v, const plr_scene *s, const plr_expected *e, plr_f
     hand_out(v, s, frame);
 }
 
-plr_status plr_vision_track(plr_vision *v, const plr_picture_pair *pair, const plr_expected *expected,
-                            plr_frame *frame) {
+plr_status plr_vision_track(plr_vision *v, const plr_picture_pair *pair,
+                            const plr_expected *expected, plr_frame *frame) {
     if (!v || !pair || !frame)
         return PLR_E_ARGUMENT;
     if (v->ready != READY)

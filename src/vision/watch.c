@@ -92,8 +92,7 @@ static void tell_delay(plr_vision *v) {
         return;
     const plr_real delay = gap_rate / rate2, rest = PLR_FMA(-delay, gap_rate, gap2);
     v->report.halves_apart_s = (float)delay;
-    v->report.halves_sigma_s =
-        (float)PLR_SQRT((rest > 0 ? rest : 0) / (g->count - 2) / rate2);
+    v->report.halves_sigma_s = (float)PLR_SQRT((rest > 0 ? rest : 0) / (g->count - 2) / rate2);
 }
 
 void plr_watch_rows(plr_vision *v, const plr_expected_motion *m) {

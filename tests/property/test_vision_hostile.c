@@ -45,9 +45,9 @@ static void fill(uint8_t *pixels, unsigned width, unsigned height, unsigned stri
         for (unsigned u = 0; u < width; u++)
             pixels[v * stride + u] =
                 (uint8_t)(kind == 1   ? rng_below(&chance, 256)
-                          : kind == 2 ? (u / side + v / side) % 2 * 255
+                          : kind == 2 ? (u / side + v / side) % 2 * 255UU
                           : kind == 3 ? side * 20
-                                      : (u / 7 == side && v / 5 == side) * 255);
+                                      : (u / 7 == side && v / 5 == side) * 255U);
 }
 
 static plr_expected any_expected(plr_depth *depths) {
@@ -57,8 +57,8 @@ static plr_expected any_expected(plr_depth *depths) {
     e.motion.R[0] = e.motion.R[8] = cos(a), e.motion.R[2] = -sin(a), e.motion.R[6] = sin(a);
     e.motion.R[4] = 1;
     for (int i = 0; i < 3; i++)
-        e.motion.p[i] = rng_below(&chance, 3) ? rng_normal(&chance) * 0.2
-                                              : rng_uniform(&chance, -100, 100);
+        e.motion.p[i] =
+            rng_below(&chance, 3) ? rng_normal(&chance) * 0.2 : rng_uniform(&chance, -100, 100);
     for (unsigned i = 0; i < 20; i++) {
         static const float odd[5] = {0, -1, 1e-30F, 1e30F, 2};
         depths[i].id = rng_below(&chance, 100);
@@ -107,8 +107,8 @@ static void test_whatever_comes_in_what_goes_out_is_finite_and_bounded(void) {
                 {l, stride, (uint16_t)width, (uint16_t)height, t},
                 {r, stride, (uint16_t)width, (uint16_t)height, t + rng_below(&chance, 1000)}};
             plr_frame frame;
-            TEST_ASSERT_EQUAL(PLR_OK, plr_vision_track(&eyes, &both,
-                                                       rng_below(&chance, 2) ? &e : NULL, &frame));
+            TEST_ASSERT_EQUAL(
+                PLR_OK, plr_vision_track(&eyes, &both, rng_below(&chance, 2) ? &e : NULL, &frame));
             demand_sound(&frame);
             taken++, seen += frame.count;
             free(l), free(r);

@@ -8,7 +8,7 @@
 #include "pelorus/vision.h"
 #include "support/random.h"
 
-enum { TEXTURE_WAVES = 48, PICTURE_SIDE_MAX = 640 };
+enum { TEXTURE_WAVES = 14 };
 
 /* A sum of waves of 7 to 50 px, which no sampling or halving can mistake. */
 typedef struct texture {

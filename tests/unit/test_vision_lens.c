@@ -31,8 +31,8 @@ static const double fisheye[8] = {-0.0135, 0.0204, -0.0128, 0.0025};
 
 static void radtan_in_double(const double k[8], double x, double y, double d[2]) {
     const double r2 = x * x + y * y;
-    const double rad = (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) /
-                       (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));
+    const double rad =
+        (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));
     d[0] = x * rad + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x);
     d[1] = y * rad + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y;
 }
@@ -68,8 +68,9 @@ static void test_equidistant_is_kalibrs_formula(void) {
         const double r = sin(theta), t2 = theta * theta;
         const plr_real ray[3] = {(plr_real)(2 * r * cos(phi)), (plr_real)(2 * r * sin(phi)),
                                  (plr_real)(2 * cos(theta))};
-        const double radius = theta * (1 + t2 * (fisheye[0] + t2 * (fisheye[1] + t2 * (fisheye[2] +
-                                                                     t2 * fisheye[3]))));
+        const double radius =
+            theta *
+            (1 + t2 * (fisheye[0] + t2 * (fisheye[1] + t2 * (fisheye[2] + t2 * fisheye[3]))));
         const double d[2] = {radius * cos(phi), radius * sin(phi)};
         demand_pixel(&o, ray, d);
     }
