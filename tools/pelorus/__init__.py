@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 ARITHMETIC = 22  # PLR_ARITHMETIC of the library that these tools belong to
 
-__all__ = ["Calibration", "Filter", "FilterError", "KnownLandmark", "PelorusError", "observations"]
+__all__ = [
+    *("Calibration", "Filter", "FilterError", "KnownLandmark", "PelorusError", "Tracker"),
+    "observations",
+]
 
 if TYPE_CHECKING:
     from pelorus.errors import PelorusError
+    from pelorus.eyes import Tracker
     from pelorus.filter import Calibration, Filter, FilterError, KnownLandmark, observations
 
 
@@ -19,6 +23,10 @@ def __getattr__(name: str) -> Any:
     """Of `__all__` at its first use: the commands need no filter, and most of them no numpy."""
     if name not in __all__:
         raise AttributeError(f"module 'pelorus' has no attribute {name!r}")
+    if name == "Tracker":
+        from pelorus.eyes import Tracker  # noqa: PLC0415
+
+        return Tracker
     from pelorus import filter as found  # noqa: PLC0415
 
     return getattr(found, name)
