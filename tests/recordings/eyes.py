@@ -3,9 +3,10 @@
 
 usage: eyes.py [--bin build/bin] [--starts 10] [--opencv]
 
-EuRoC MH_01's first ten seconds of $PELORUS_DATA (by default ../shared/data), whole and halved once and
-twice; the gyro alone predicts, with its bias in it; settings of tools/config/imu-adis16448.conf. Several
-starts, each a tenth of a second later: medians. Absent recordings are left out.
+EuRoC MH_01's first ten seconds of $PELORUS_DATA (by default ../shared/data), whole and halved
+once and twice; the gyro alone predicts, with its bias in it; settings of
+tools/config/imu-adis16448.conf. Several starts, each a tenth of a second later: medians. An absent
+recording is left out.
 
 err0, ATE   mm, as `pelorus evaluate` has them
 NEES/6      mean; 1 is expected
@@ -18,6 +19,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import judge
@@ -60,7 +62,7 @@ def small(picture: Gray, times: int) -> Gray:
 def turns(t_ns: Times, readings: Inertial, R_CB: Floats) -> list[Floats]:
     """How points are expected to turn in the camera from each pair to the next, by the gyro."""
     found = []
-    for begin, end in zip(t_ns[:-1], t_ns[1:], strict=True):
+    for begin, end in pairwise(t_ns.tolist()):
         between = (readings.t_ns >= begin) & (readings.t_ns < end)
         theta = readings.w_B_radps[between].mean(axis=0) * (end - begin) * 1e-9
         found.append(R_CB @ Rotation.from_rotvec(theta).as_matrix().T @ R_CB.T)
@@ -70,7 +72,8 @@ def turns(t_ns: Times, readings: Inertial, R_CB: Floats) -> list[Floats]:
 def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]:
     """The recording as eyes see it, and the mean length of a track."""
     assert found.calibrated.rig is not None
-    assert isinstance(found.frames, Pictures) and isinstance(found.motion, Readings)
+    assert isinstance(found.frames, Pictures)
+    assert isinstance(found.motion, Readings)
     rig = found.calibrated.rig
     rig = replace(rig, left=shrunk(rig.left, times), right=shrunk(rig.right, times))
     assert rig.T_LB is not None

@@ -9,7 +9,12 @@ __version__ = "0.1.0"
 ARITHMETIC = 22  # PLR_ARITHMETIC of the library that these tools belong to
 
 __all__ = [
-    *("Calibration", "Filter", "FilterError", "KnownLandmark", "PelorusError", "Tracker"),
+    "Calibration",
+    "Filter",
+    "FilterError",
+    "KnownLandmark",
+    "PelorusError",
+    "Tracker",
     "observations",
 ]
 

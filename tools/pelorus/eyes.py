@@ -5,7 +5,7 @@
 
     tracker = Tracker.from_files(["camchain.yaml"], width_px=752, height_px=480)
     filter = Filter(tracker.calibration(R_LB, t_LB_m))
-    seen = tracker.track(t_ns, left, right)               # at every stereo pair, uint8 (rows, columns)
+    seen = tracker.track(t_ns, left, right)  # at every stereo pair: uint8 (rows, columns)
     filter.update(seen.t_ns, seen.observations)
 
 Pictures need not be rectified: observations are those of a virtual rectified camera C.
@@ -39,6 +39,7 @@ SIGHT = np.dtype(
     [("id", "<u4"), ("age", "<u2"), ("sigma_px", "<f4"), ("likeness", "<f4")], align=True
 )
 ENDED = np.dtype([("id", "<u4"), ("age", "<u2"), ("why", "u1")], align=True)
+PIXELS = ("uL_px", "vL_px", "uR_px", "vR_px")
 DEPTH = np.dtype([("id", "<u4"), ("z_m", "<f4")])
 MODELS = {LensModel.NONE: 0, LensModel.RADTAN: 1, LensModel.EQUIDISTANT: 2}
 COEFFICIENTS_MAX = 8
@@ -66,8 +67,8 @@ class PictureFault(IntFlag):
 
 @dataclass(frozen=True)
 class Seen:
-    """What a pair shows: `observations` for Filter.update at t_ns, `sights` beside them (id, age, sigma_px,
-    likeness), the tracks that `ended` (id, age, why), and the report."""
+    """What a pair shows: `observations` for Filter.update at t_ns, `sights` beside them (id, age,
+    sigma_px, likeness), the tracks that `ended` (id, age, why), and the report."""
 
     t_ns: int
     observations: NDArray[np.void]
@@ -78,11 +79,11 @@ class Seen:
     @property
     def pixels(self) -> NDArray[np.float32]:
         """(n, 4) uL vL uR vR."""
-        return np.stack([self.observations[name] for name in OBSERVATION.names[1:]], axis=-1)
+        return np.stack([self.observations[name] for name in PIXELS], axis=-1)
 
 
 class Tracker:
-    """Follows points through stereo pairs. One tracker is not thread-safe; several are independent."""
+    """Follows points through stereo pairs. One tracker is not thread-safe; several may be used."""
 
     def __init__(
         self,
@@ -130,7 +131,7 @@ class Tracker:
     def from_files(
         cls, paths: Sequence[str | Path], width_px: int, height_px: int, **how: object
     ) -> Self:
-        """Of any calibration that `pelorus convert` reads: Kalibr, OpenCV, Basalt, VINS and others."""
+        """Of any calibration that `pelorus convert` reads: Kalibr, OpenCV, Basalt, VINS ..."""
         from pelorus.rig import read  # noqa: PLC0415 - reads files, which most callers do not
 
         found = read.read(tuple(Path(path) for path in paths), "eyes").rig
@@ -138,8 +139,11 @@ class Tracker:
             raise PelorusError(f"{paths[0]}: does not tell the two cameras")
         return cls(found.of_size(width_px, height_px), **how)  # type: ignore[arg-type]
 
-    def calibration(self, R_LB: ArrayLike | None = None, t_LB_m: ArrayLike = (0, 0, 0)) -> Calibration:
-        """The virtual camera, for a Filter: a point s_B of the body is R_LB s_B + t_LB_m in the left camera."""
+    def calibration(
+        self, R_LB: ArrayLike | None = None, t_LB_m: ArrayLike = (0, 0, 0)
+    ) -> Calibration:
+        """The virtual camera, for a Filter: a point s_B of the body is R_LB s_B + t_LB_m in the
+        left camera."""
         told = NativeCalibration()
         where = _pose(np.eye(3) if R_LB is None else np.asarray(R_LB), np.asarray(t_LB_m))
         self._call(
@@ -164,9 +168,9 @@ class Tracker:
         depths: tuple[ArrayLike, ArrayLike] | None = None,
         t_right_ns: int | None = None,
     ) -> Seen:
-        """The next pair: uint8 (rows, columns). `motion` (R, p) is how points are expected to have moved since
-        the last one, x -> R x + p in the virtual camera; `depths` (ids, z_m) what is known of tracks'
-        distances."""
+        """The next pair: uint8 (rows, columns). `motion` (R, p) is how points are expected to have
+        moved since the last one, x -> R x + p in the virtual camera; `depths` (ids, z_m) what is
+        known of tracks' distances."""
         lefts, rights = _grey("left", left), _grey("right", right)
         pair = native_vision.Pair(
             _picture(lefts, t_ns), _picture(rights, t_ns if t_right_ns is None else t_right_ns)
@@ -211,8 +215,8 @@ def _lens(lens: Lens) -> native_vision.Lens:
     if lens.model not in MODELS or len(lens.coefficients) > COEFFICIENTS_MAX:
         known = "none, radtan (4, 5 or 8 numbers) and equidistant"
         raise PelorusError(
-            f"a lens {lens.model} with {len(lens.coefficients)} numbers: {known} are followed as they "
-            "are; rectify the pictures first"
+            f"a lens {lens.model} with {len(lens.coefficients)} numbers: {known} are followed as "
+            "they are; rectify the pictures first"
         )
     k = (c.c_double * COEFFICIENTS_MAX)(*lens.coefficients)
     return native_vision.Lens(
@@ -222,18 +226,25 @@ def _lens(lens: Lens) -> native_vision.Lens:
 
 def _pose(R: Floats, p: Floats) -> Pose:
     if R.shape != (3, 3) or p.shape != (3,):
-        raise PelorusError(f"a motion of shapes {R.shape} and {p.shape}; (3, 3) and (3,) are wanted")
+        raise PelorusError(
+            f"a motion of shapes {R.shape} and {p.shape}; (3, 3) and (3,) are wanted"
+        )
     return Pose((c.c_double * 9)(*R.ravel().tolist()), (c.c_double * 3)(*p.tolist()))
 
 
 def _grey(side: str, picture: ArrayLike) -> NDArray[np.uint8]:
     pixels = np.asarray(picture)
     if pixels.dtype != np.uint8 or pixels.ndim != 2:
-        remedy = "colour: convert it to grey" if pixels.ndim == 3 else "16 bits: keep the upper eight"
-        raise PelorusError(
-            f"{side}: {pixels.dtype} of shape {pixels.shape}; uint8 of (rows, columns) is wanted ({remedy})"
+        remedy = (
+            "colour: convert it to grey" if pixels.ndim == 3 else "16 bits: keep the upper eight"
         )
-    return pixels if pixels.strides[1] == 1 and pixels.strides[0] > 0 else np.ascontiguousarray(pixels)
+        raise PelorusError(
+            f"{side}: {pixels.dtype} of shape {pixels.shape}; uint8 of (rows, columns) is wanted "
+            f"({remedy})"
+        )
+    return (
+        pixels if pixels.strides[1] == 1 and pixels.strides[0] > 0 else np.ascontiguousarray(pixels)
+    )
 
 
 def _picture(pixels: NDArray[np.uint8], t_ns: int) -> native_vision.Picture:
@@ -244,9 +255,11 @@ def _picture(pixels: NDArray[np.uint8], t_ns: int) -> native_vision.Picture:
 
 
 def _depths(given: tuple[ArrayLike, ArrayLike] | None) -> NDArray[np.void]:
-    ids, z_m = ([], []) if given is None else (np.asarray(given[0]), np.asarray(given[1]))
-    if len(ids) != len(z_m) or (len(ids) and not 0 <= np.min(ids) <= np.max(ids) <= MOST_ID):
-        raise PelorusError(f"depths: {len(ids)} ids and {len(z_m)} distances; equal numbers are wanted")
+    ids, z_m = (np.asarray(part) for part in (((), ()) if given is None else given))
+    if len(ids) != len(z_m) or (len(ids) and not 0 <= ids.min() <= ids.max() <= MOST_ID):
+        raise PelorusError(
+            f"depths: {len(ids)} ids and {len(z_m)} distances; equal numbers are wanted"
+        )
     known = np.empty(len(ids), DEPTH)
     known["id"], known["z_m"] = ids, z_m
     return known

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The structs and functions of include/pelorus/vision.h for ctypes. `pelorus.Tracker` stands on them."""
+"""The structs and functions of include/pelorus/vision.h, for `pelorus.Tracker`."""
 
 from __future__ import annotations
 
