@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Draws docs/images/eyes.webp: tracks of `pelorus.Tracker` in two rendered pictures of hero.py's drive.
+"""Draws docs/images/eyes.webp: tracks of `pelorus.Tracker` in two pictures of hero.py's drive.
 
 usage: PYTHONPATH=tools eyes.py [FILE.webp]
 """
