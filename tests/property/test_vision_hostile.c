@@ -45,7 +45,7 @@ static void fill(uint8_t *pixels, unsigned width, unsigned height, unsigned stri
         for (unsigned u = 0; u < width; u++)
             pixels[v * stride + u] =
                 (uint8_t)(kind == 1   ? rng_below(&chance, 256)
-                          : kind == 2 ? (u / side + v / side) % 2 * 255UU
+                          : kind == 2 ? (u / side + v / side) % 2 * 255U
                           : kind == 3 ? side * 20
                                       : (u / 7 == side && v / 5 == side) * 255U);
 }
