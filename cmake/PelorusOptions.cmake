@@ -14,6 +14,12 @@ set(PLR_MAX_CALIBRATION 5 CACHE STRING
   "Most numbers of the calibration that can be estimated, 0 to 11; on the desk 11")
 option(PLR_SUPERVISE "With src/supervise; OFF: the estimator alone, for who has a supervisor of his own" ON)
 option(PLR_KNOWN_MAP "With src/known_map; OFF: known-map and localization are refused" ON)
+option(PLR_VISION "With src/vision, which follows points through pictures; OFF: the tracker is somebody else's" ON)
+set(PLR_VISION_PIXELS 76800 CACHE STRING "Most pixels of a picture, 2304 to 16777216")
+set(PLR_VISION_TRACKS 50 CACHE STRING "Most points that are followed in pictures, 1 to 1024")
+set(PLR_VISION_LEVELS 4 CACHE STRING "Most levels of a picture's pyramid, 1 to 6; results depend on it")
+set(PELORUS_DESKTOP_PIXELS 3145728 CACHE STRING "Most pixels of a picture at the desk")
+set(PELORUS_DESKTOP_TRACKS 400 CACHE STRING "Most points that are followed at the desk, 1 to 1024")
 option(PLR_PORTABLE
   "Exact fused multiply-add in software: runs on any processor, slower, the same bits" OFF)
 

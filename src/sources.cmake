@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # The library's sources, for every build: it stands beside them, so that src, include and a port are all that a
-# build on another system has to take. A room that is left out is replaced by the file of its name in absent.
+# build on another system has to take. A room that is left out is replaced by the file of its name in absent;
+# nothing inside the library calls vision, so nothing stands in for it.
 function(pelorus_sources result)
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/*/*.c")
   foreach(room supervise known_map)
@@ -11,5 +12,8 @@ function(pelorus_sources result)
       list(FILTER sources EXCLUDE REGEX "/src/absent/${room}\\.c$")
     endif()
   endforeach()
+  if(DEFINED PLR_VISION AND NOT PLR_VISION)
+    list(FILTER sources EXCLUDE REGEX "/src/vision/")
+  endif()
   set(${result} "${sources}" PARENT_SCOPE)
 endfunction()

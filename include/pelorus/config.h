@@ -76,6 +76,24 @@ extern "C" {
 #define PLR_KNOWN_MAP 1
 #endif
 
+/* 1 (default) or 0. 0: without src/vision, which is then not compiled: pictures are somebody else's. */
+#ifndef PLR_VISION
+#define PLR_VISION 1
+#endif
+
+/* Of vision.h alone: most pixels of a picture (default 320 x 240), most points that are followed, 1 to 1024
+ * (default 50), and most levels of a pyramid, 1 to 6 (default 4). The pair's pictures are the caller's;
+ * beside them a plr_vision takes 2/3 of a picture, and 121 bytes a level and some 200 for each point. */
+#ifndef PLR_VISION_PIXELS
+#define PLR_VISION_PIXELS 76800
+#endif
+#ifndef PLR_VISION_TRACKS
+#define PLR_VISION_TRACKS 50
+#endif
+#ifndef PLR_VISION_LEVELS
+#define PLR_VISION_LEVELS 4
+#endif
+
 /* Columns of the tile that the update's kernel keeps in registers: a divisor of 16 or 6, default 16
  * with AVX, 8 with WebAssembly's relaxed SIMD, else 4. It changes the speed, and no bit of a result. */
 #ifndef PLR_TILE_COLUMNS
@@ -129,6 +147,16 @@ extern "C" {
 
 #if PLR_MAX_CALIBRATION < 0 || PLR_MAX_CALIBRATION > 11
 #error "PLR_MAX_CALIBRATION must be 0 to 11."
+#endif
+
+#if PLR_VISION_PIXELS < 2304 || PLR_VISION_PIXELS > 16777216
+#error "PLR_VISION_PIXELS must be 2304 to 16777216."
+#endif
+#if PLR_VISION_TRACKS < 1 || PLR_VISION_TRACKS > 1024
+#error "PLR_VISION_TRACKS must be 1 to 1024."
+#endif
+#if PLR_VISION_LEVELS < 1 || PLR_VISION_LEVELS > 6
+#error "PLR_VISION_LEVELS must be 1 to 6."
 #endif
 
 #if PLR_REAL == 32

@@ -11,7 +11,8 @@ idf_component_register(
   INCLUDE_DIRS "${pelorus_component_root}/include"
   PRIV_INCLUDE_DIRS "${pelorus_component_root}/src")
 target_compile_options(${COMPONENT_LIB} PRIVATE -ffp-contract=off -fno-math-errno)
-foreach(option PLR_MAX_LANDMARKS PLR_MAX_OBSERVATIONS PLR_MAX_CALIBRATION PLR_PORTABLE PLR_SUPERVISE PLR_KNOWN_MAP)
+foreach(option PLR_MAX_LANDMARKS PLR_MAX_OBSERVATIONS PLR_MAX_CALIBRATION PLR_PORTABLE PLR_SUPERVISE PLR_KNOWN_MAP
+    PLR_VISION PLR_VISION_PIXELS PLR_VISION_TRACKS PLR_VISION_LEVELS)
   if(DEFINED ${option})
     target_compile_definitions(${COMPONENT_LIB} PUBLIC ${option}=${${option}})
   endif()

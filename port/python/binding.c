@@ -6,6 +6,7 @@
 
 #include "pelorus/pelorus.h"
 #include "pelorus/session.h"
+#include "pelorus/vision.h"
 #include "posix/processor.h"
 
 #define SIZE(type)                                                                                 \
@@ -20,28 +21,36 @@ uint32_t plr_binding_size_of(const char *name) {
         const char *name;
         uint32_t size;
     } table[] = {
-        SIZE(plr_calibration),
-        SIZE(plr_config),
-        SIZE(plr_frame),
-        SIZE(plr_health_state),
-        SIZE(plr_imu),
-        SIZE(plr_landmark),
-        SIZE(plr_map),
-        SIZE(plr_observation),
-        SIZE(plr_pose),
-        SIZE(plr_reading),
-        SIZE(plr_reading_result),
-        SIZE(plr_report),
-        SIZE(plr_setting),
-        SIZE(plr_sizes),
-        SIZE(plr_supervision),
-        SIZE(plr_totals),
-        SIZE(plr_twist),
+        SIZE(plr_calibration),  SIZE(plr_ended_track),    SIZE(plr_expected),
+        SIZE(plr_config),       SIZE(plr_frame),          SIZE(plr_health_state),
+        SIZE(plr_imu),          SIZE(plr_landmark),       SIZE(plr_map),
+        SIZE(plr_lens),         SIZE(plr_observation),    SIZE(plr_picture),
+        SIZE(plr_picture_pair), SIZE(plr_depth),          SIZE(plr_pose),
+        SIZE(plr_reading),      SIZE(plr_reading_result), SIZE(plr_report),
+        SIZE(plr_rig),          SIZE(plr_setting),        SIZE(plr_sight),
+        SIZE(plr_sizes),        SIZE(plr_supervision),    SIZE(plr_totals),
+        SIZE(plr_twist),        SIZE(plr_vision),         SIZE(plr_vision_report),
     };
     for (unsigned i = 0; i < sizeof table / sizeof table[0]; i++)
         if (strcmp(table[i].name, name) == 0)
             return table[i].size;
     return 0;
+}
+
+plr_status plr_binding_vision_init(plr_vision *v, const plr_rig *rig) {
+    return plr_vision_init(v, rig);
+}
+
+const plr_vision_report *plr_binding_vision_report(const plr_vision *v, const plr_sight **sights,
+                                                   const plr_ended_track **ended) {
+    *sights = v->sights;
+    *ended = v->ended;
+    return &v->report;
+}
+
+uint32_t plr_binding_vision_limits(uint32_t *tracks) {
+    *tracks = PLR_VISION_TRACKS;
+    return PLR_VISION_PIXELS;
 }
 
 plr_status plr_binding_settings(plr_config *config, const uint8_t *bytes, size_t n,

@@ -24,6 +24,7 @@ FOLDERS: dict[str, set[str]] = {
     "sensor": {"sensor", "state", "math"},
     "supervise": {"supervise", "math"},
     "known_map": {"known_map", "sensor", "state", "math"},
+    "vision": {"vision", "math"},
     "filter": {
         "filter",
         "known_map",
@@ -65,6 +66,8 @@ HEADERS: dict[str, set[str]] = {
         "types.h",
     },
     "known_map": FILTER_HEADERS - {"filter.h", "pelorus.h"},
+    # Eyes see pictures, and no filter.
+    "vision": {"assertions.h", "config.h", "types.h", "vision.h"},
     "absent": FILTER_HEADERS - {"filter.h", "pelorus.h"},
     "filter": FILTER_HEADERS,
     "session": FILTER_HEADERS
@@ -97,6 +100,7 @@ SIBLINGS: dict[str, set[str]] = {
     "state.h": {"camera.h", "config.h", "settings.h", "supervisor.h", "types.h"},
     "filter.h": FILTER_HEADERS - {"filter.h", "pelorus.h"},
     "pelorus.h": FILTER_HEADERS - {"pelorus.h"},
+    "vision.h": {"config.h", "types.h"},
     "wire.h": {"types.h"},
     "port.h": {"types.h"},
     "session_parts.h": {"config.h", "wire.h"},

@@ -15,11 +15,13 @@ __all__ = [
     "KnownLandmark",
     "PelorusError",
     "Reason",
+    "Tracker",
     "observations",
 ]
 
 if TYPE_CHECKING:
     from pelorus.errors import PelorusError
+    from pelorus.eyes import Tracker
     from pelorus.filter import (
         Calibration,
         Filter,
@@ -34,6 +36,10 @@ def __getattr__(name: str) -> Any:
     """Of `__all__` at its first use: the commands need no filter, and most of them no numpy."""
     if name not in __all__:
         raise AttributeError(f"module 'pelorus' has no attribute {name!r}")
+    if name == "Tracker":
+        from pelorus.eyes import Tracker  # noqa: PLC0415
+
+        return Tracker
     from pelorus import filter as found  # noqa: PLC0415
 
     return getattr(found, name)

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+#include "vision/patch.h"
+
+#include "math/small.h"
+
+enum { HALF = PLR_PATCH_SIDE / 2, KEPT_HALF = PLR_PATCH_KEPT / 2, FRACTION = 16, WEIGHT = 6 };
+
+#define UNIT     PLR_R(65536)
+#define STEP_MAX PLR_R(2)    /* px */
+#define STEP_END PLR_R(0.02) /* px */
+/* Grey levels' noise that no residual may claim to be below: rounding to whole levels, twice. */
+#define GREY_VAR PLR_R(2.0 / 12 * PLR_GREY * PLR_GREY)
+/* What a patch that fits exactly is still off by: interpolation, aliasing, rounded weights; px^2. */
+#define FLOOR_VAR PLR_R(0.08 * 0.08)
+/* A patch whose place this noise alone makes uncertain by half a pixel has no contrast. */
+#define WEAKEST (GREY_VAR * PLR_R(4))
+
+/* --- cutting --- */
+
+/* The sample at a place in 1/65536 px: grey levels times 16. */
+static inline int32_t sample(const plr_image *image, int32_t x, int32_t y) {
+    const uint8_t *p = image->pixels + (uint32_t)(y >> FRACTION) * image->stride + (x >> FRACTION);
+    const uint8_t *q = p + image->stride;
+    const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63, wy = (y >> (FRACTION - WEIGHT)) & 63;
+    const int32_t top = 64 * p[0] + wx * (p[1] - p[0]), low = 64 * q[0] + wx * (q[1] - q[0]);
+    return (64 * top + wy * (low - top) + 128) >> 8;
+}
+
+/* Places of a window of so many px each way that stay inside, with the neighbour that is interpolated. */
+static bool inside(const plr_image *image, const plr_real at[2], plr_real across, plr_real down) {
+    const plr_real right = (plr_real)image->width - PLR_R(1.01);
+    const plr_real low = (plr_real)image->height - PLR_R(1.01);
+    return at[0] >= across && at[0] + across <= right && at[1] >= down && at[1] + down <= low;
+}
+
+/* Rounded to the weights' resolution. */
+static int32_t fixed(plr_real x) {
+    return (int32_t)(x * UNIT) + (1 << (FRACTION - WEIGHT - 1));
+}
+
+bool plr_patch_cut(const plr_image *image, const plr_real at[2], uint8_t patch[PLR_PATCH_BYTES]) {
+    if (!inside(image, at, KEPT_HALF, KEPT_HALF))
+        return false;
+    const int32_t x = fixed(at[0]), y = fixed(at[1]);
+    for (int j = 0; j < PLR_PATCH_KEPT; j++)
+        for (int i = 0; i < PLR_PATCH_KEPT; i++) {
+            const int32_t s = sample(image, x + (i - KEPT_HALF) * (1 << FRACTION),
+                                     y + (j - KEPT_HALF) * (1 << FRACTION));
+            patch[PLR_PATCH_KEPT * j + i] = (uint8_t)((s + PLR_GREY / 2) / PLR_GREY);
+        }
+    return true;
+}
+
+/* sum a b - sum a sum b / n: the sum of products without the means. */
+static plr_real central(int64_t sum_ab, int32_t sum_a, int32_t sum_b) {
+    return (plr_real)(sum_ab * PLR_SAMPLES - (int64_t)sum_a * sum_b) / PLR_SAMPLES;
+}
+
+bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]) {
+    int32_t T = 0, Jx = 0, Jy = 0, TT = 0, xT = 0, yT = 0, xx = 0, xy = 0, yy = 0;
+    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++)
+        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++) {
+            const uint8_t *p = patch + PLR_PATCH_KEPT * (j + 1) + i + 1;
+            const int32_t s = PLR_GREY * p[0], x = PLR_GREY / 2 * (p[1] - p[-1]);
+            const int32_t y = PLR_GREY / 2 * (p[PLR_PATCH_KEPT] - p[-PLR_PATCH_KEPT]);
+            t->T[k] = (int16_t)s, t->Jx[k] = (int16_t)x, t->Jy[k] = (int16_t)y;
+            T += s, Jx += x, Jy += y;
+            TT += s * s, xT += x * s, yT += y * s;
+            xx += x * x, xy += x * y, yy += y * y;
+        }
+    t->sum_T = T, t->sum_Jx = Jx, t->sum_Jy = Jy;
+    t->TT = central(TT, T, T), t->JxT = central(xT, Jx, T), t->JyT = central(yT, Jy, T);
+    t->H[0] = central(xx, Jx, Jx), t->H[1] = central(xy, Jx, Jy), t->H[2] = central(yy, Jy, Jy);
+    const plr_real det = PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
+    /* the smaller eigenvalue is at least det / trace */
+    return t->TT > 0 && det > WEAKEST * (t->H[0] + t->H[2]);
+}
+
+/* --- sums --- */
+
+bool plr_grid_place(plr_grid *g, const plr_image *image, const plr_real at[2],
+                    const plr_real A[4]) {
+    const plr_real across = HALF * (plr_abs(A[0]) + plr_abs(A[1]));
+    const plr_real down = HALF * (plr_abs(A[2]) + plr_abs(A[3]));
+    if (!(across < PLR_R(64)) || !(down < PLR_R(64)) ||
+        !inside(image, at, across + PLR_R(0.05), down + PLR_R(0.05)))
+        return false;
+    g->x = fixed(at[0]), g->y = fixed(at[1]);
+    for (int i = 0; i < 4; i++)
+        g->A[i] = (int32_t)(A[i] * UNIT);
+    return true;
+}
+
+/* Sums in 32 bits: 81 times the largest product, 4080^2, is 1.35e9. */
+void plr_patch_sum(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
+                   const plr_template *t) {
+    const uint8_t *pixels = image->pixels;
+    const uint32_t stride = image->stride;
+    int32_t I = 0, II = 0, IT = 0, IJx = 0, IJy = 0;
+    int32_t x0 = g->x - HALF * (g->A[0] + g->A[1]), y0 = g->y - HALF * (g->A[2] + g->A[3]);
+    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++, x0 += g->A[1], y0 += g->A[3]) {
+        int32_t x = x0, y = y0;
+        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++, x += g->A[0], y += g->A[2]) {
+            const uint8_t *p = pixels + (uint32_t)(y >> FRACTION) * stride + (x >> FRACTION);
+            const uint8_t *q = p + stride;
+            const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63;
+            const int32_t wy = (y >> (FRACTION - WEIGHT)) & 63;
+            const int32_t top = 64 * p[0] + wx * (p[1] - p[0]);
+            const int32_t low = 64 * q[0] + wx * (q[1] - q[0]);
+            const int32_t v = (64 * top + wy * (low - top) + 128) >> 8;
+            I += v, II += v * v;
+            IT += v * t->T[k], IJx += v * t->Jx[k], IJy += v * t->Jy[k];
+        }
+    }
+    s->I = I, s->II = II, s->IT = IT, s->IJx = IJx, s->IJy = IJy;
+}
+
+/* --- fits --- */
+
+/* The sums without their means. */
+typedef struct plr_centred {
+    plr_real II, IT, IJx, IJy;
+} plr_centred;
+
+static plr_centred centred(const plr_patch_sums *s, const plr_template *t) {
+    const plr_centred c = {central(s->II, s->I, s->I), central(s->IT, s->I, t->sum_T),
+                           central(s->IJx, s->I, t->sum_Jx), central(s->IJy, s->I, t->sum_Jy)};
+    return c;
+}
+
+static plr_real correlation(const plr_centred *c, const plr_template *t) {
+    return c->II > 0 ? c->IT / PLR_SQRT(c->II * t->TT) : PLR_R(0);
+}
+
+plr_real plr_patch_likeness(const plr_image *image, const plr_template *t, const plr_real at[2],
+                            const plr_real A[4]) {
+    plr_grid g;
+    plr_patch_sums s;
+    if (!plr_grid_place(&g, image, at, A))
+        return -1;
+    plr_patch_sum(&s, image, &g, t);
+    const plr_centred c = centred(&s, t);
+    return correlation(&c, t);
+}
+
+/* cov = A (2 var S^-1 H S^-1 + floor I) A^T, var the noise of one picture, S = H less what noise adds to the
+ * squares of J. Interpolation has averaged a part of the noise out of the residuals: they have 1.44 var. */
+static void uncertainty(plr_fit *fit, const plr_template *t, const plr_real A[4],
+                        plr_real squares) {
+    const plr_real residual = (squares > 0 ? squares : 0) / (PLR_SAMPLES - 4) + GREY_VAR;
+    const plr_real var = residual / PLR_R(1.44), *H = t->H;
+    const plr_real weaker = PLR_FMA(H[0], H[2], -(H[1] * H[1])) / (H[0] + H[2]);
+    const plr_real noise = PLR_SAMPLES / 2 * var, most = weaker / 2;
+    const plr_real less = noise < most ? noise : most;
+    const plr_real a = H[0] - less, c = H[2] - less, b = H[1];
+    const plr_real by_det = 1 / PLR_FMA(a, c, -(b * b));
+    const plr_real S[3] = {c * by_det, -(b * by_det), a * by_det};
+    const plr_real p = PLR_FMA(S[0], H[0], S[1] * H[1]), q = PLR_FMA(S[0], H[1], S[1] * H[2]);
+    const plr_real r = PLR_FMA(S[1], H[0], S[2] * H[1]), s = PLR_FMA(S[1], H[1], S[2] * H[2]);
+    const plr_real xx = PLR_FMA(2 * var, PLR_FMA(p, S[0], q * S[1]), FLOOR_VAR);
+    const plr_real xy = 2 * var * PLR_FMA(p, S[1], q * S[2]);
+    const plr_real yy = PLR_FMA(2 * var, PLR_FMA(r, S[1], s * S[2]), FLOOR_VAR);
+    const plr_real e = PLR_FMA(A[0], xx, A[1] * xy), f = PLR_FMA(A[0], xy, A[1] * yy);
+    fit->cov[0] = PLR_FMA(e, A[0], f * A[1]);
+    fit->cov[1] = PLR_FMA(e, A[2], f * A[3]);
+    fit->cov[2] = PLR_FMA(PLR_FMA(A[2], xx, A[3] * xy), A[2], PLR_FMA(A[2], xy, A[3] * yy) * A[3]);
+}
+
+/* One step's d from the place of the grid; false where the picture has no contrast there. */
+static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const plr_template *t,
+                 plr_real d[2], plr_real *squares) {
+    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
+    plr_patch_sums s;
+    plr_patch_sum(&s, image, g, t);
+    const plr_centred c = centred(&s, t);
+    fit->likeness = correlation(&c, t);
+    fit->steps++;
+    if (!(c.II > 0))
+        return false;
+    const plr_real gain = PLR_SQRT(t->TT / c.II);
+    const plr_real bx = PLR_FMA(gain, c.IJx, -t->JxT), by = PLR_FMA(gain, c.IJy, -t->JyT);
+    d[0] = PLR_FMA(t->H[2], bx, -(t->H[1] * by)) * by_det;
+    d[1] = PLR_FMA(t->H[0], by, -(t->H[1] * bx)) * by_det;
+    /* |g I~ - T~|^2, less what the step takes off */
+    *squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(d[0], bx, d[1] * by);
+    return true;
+}
+
+void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, const plr_real A[4],
+                   unsigned most_steps) {
+    plr_grid g;
+    plr_real d[2], squares = 0;
+    fit->ended = false;
+    fit->likeness = 0;
+    for (fit->steps = 0; fit->steps < most_steps && !fit->ended;) {
+        fit->inside = plr_grid_place(&g, image, fit->at, A);
+        if (!fit->inside || !step(fit, image, &g, t, d, &squares))
+            return;
+        const plr_real length = PLR_SQRT(PLR_FMA(d[0], d[0], d[1] * d[1]));
+        const plr_real cut = length > STEP_MAX ? STEP_MAX / length : PLR_R(1);
+        d[0] *= cut, d[1] *= cut;
+        fit->at[0] = PLR_FMA(-A[0], d[0], PLR_FMA(-A[1], d[1], fit->at[0]));
+        fit->at[1] = PLR_FMA(-A[2], d[0], PLR_FMA(-A[3], d[1], fit->at[1]));
+        fit->ended = length < STEP_END;
+    }
+    fit->inside = plr_grid_place(&g, image, fit->at, A);
+    uncertainty(fit, t, A, squares);
+}

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+#include "vision/track.h"
+
+#include <string.h>
+
+#include "math/small.h"
+#include "vision/patch.h"
+
+enum { STEPS_COARSE = 5, STEPS_FINEST = 10 };
+
+/* Normalised correlation that is enough: with the patch of the birth, with the other picture. */
+#define LIKE PLR_R(0.8)
+/* On a coarse level, to be believed at all. */
+#define LIKE_COARSE PLR_R(0.6)
+/* So far from where it begins the finest fit is that of the same patch: half its side, px. */
+#define NEAR PLR_R(4)
+/* det A at which the patch of the birth shows too little or too much of what is there now. */
+#define SMALLEST PLR_R(0.45)
+#define LARGEST  PLR_R(2.2)
+
+/* Finds `patch` of so many levels near `at` (px of level 0, in and out), from the level `from` on. */
+static bool find(plr_vision *v, const plr_levels *in, const uint8_t (*patch)[PLR_PATCH_BYTES],
+                 unsigned from, const plr_real A[4], plr_real at[2], plr_fit *fit) {
+    plr_template t;
+    plr_real start[2] = {at[0], at[1]};
+    memset(fit, 0, sizeof *fit);
+    for (unsigned level = from + 1; level-- > 0;) {
+        if (!plr_template_make(&t, patch[level]))
+            continue;
+        start[0] = at[0], start[1] = at[1];
+        fit->at[0] = plr_pyramid_down(at[0], level), fit->at[1] = plr_pyramid_down(at[1], level);
+        plr_patch_fit(fit, &in->level[level], &t, A, level > 0 ? STEPS_COARSE : STEPS_FINEST);
+        v->report.steps = (uint16_t)(v->report.steps + fit->steps);
+        if (fit->inside && (level == 0 || fit->likeness > LIKE_COARSE)) {
+            at[0] = plr_pyramid_up(fit->at[0], level);
+            at[1] = plr_pyramid_up(fit->at[1], level);
+        }
+    }
+    const plr_real x = at[0] - start[0], y = at[1] - start[1];
+    fit->ended = fit->ended && PLR_FMA(x, x, y * y) < NEAR * NEAR;
+    return fit->inside && fit->ended && fit->likeness > LIKE;
+}
+
+/* A patch of each level around a place; returns how many levels have one. */
+static unsigned cut(const plr_levels *from, const plr_real at[2],
+                    uint8_t (*patch)[PLR_PATCH_BYTES]) {
+    unsigned level = 0;
+    for (; level < from->count; level++) {
+        const plr_real here[2] = {plr_pyramid_down(at[0], level), plr_pyramid_down(at[1], level)};
+        if (!plr_patch_cut(&from->level[level], here, patch[level]))
+            break;
+    }
+    return level;
+}
+
+/* --- from picture to picture --- */
+
+static plr_real det(const plr_real A[4]) {
+    return PLR_FMA(A[0], A[3], -(A[1] * A[2]));
+}
+
+static bool end(plr_track *t, plr_track_end why) {
+    t->why = (uint8_t)why;
+    return false;
+}
+
+static bool is_inside(const plr_vision *v, const plr_real at[2]) {
+    return at[0] >= 0 && at[1] >= 0 && at[0] <= (plr_real)(v->width - 1) &&
+           at[1] <= (plr_real)(v->height - 1);
+}
+
+bool plr_track_expect(const plr_vision *v, const plr_expected_motion *m, plr_track *t) {
+    plr_real to[2], by[4];
+    if (!plr_rig_forward(v, m, t->at, &t->disparity, to, by))
+        return end(t, PLR_TRACK_LEFT_VIEW);
+    const plr_real A[4] = {t->A[0], t->A[1], t->A[2], t->A[3]};
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            t->A[2 * i + j] = PLR_FMA(by[2 * i], A[j], by[2 * i + 1] * A[2 + j]);
+    if (m->place_known)
+        t->drift[0] = t->drift[1] = 0;
+    for (int i = 0; i < 2; i++)
+        t->at[i] = to[i] + t->drift[i];
+    const plr_real d = det(t->A);
+    if (!is_inside(v, t->at) || !(d > PLR_R(0.05) && d < PLR_R(20)))
+        return end(t, PLR_TRACK_LEFT_VIEW);
+    return true;
+}
+
+bool plr_track_stays(const plr_vision *v, const plr_expected_motion *m, const plr_track *t) {
+    plr_real at[2] = {t->at[0], t->at[1]}, disparity = t->disparity;
+    for (int pair = 0; pair < 2; pair++) {
+        plr_real to[2], A[4];
+        if (!plr_rig_forward(v, m, at, &disparity, to, A) || !is_inside(v, to))
+            return false;
+        at[0] = to[0], at[1] = to[1];
+    }
+    return true;
+}
+
+/* What is seen now becomes the patch; the error of the place in it stays from now on. */
+static void cut_anew(plr_vision *v, const plr_scene *s, plr_track *t) {
+    uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
+    const unsigned levels = cut(&s->side[PLR_LEFT], t->at, patch);
+    if (levels == 0)
+        return;
+    memcpy(t->patch, patch, levels * sizeof patch[0]);
+    t->levels = (uint8_t)levels;
+    t->A[0] = t->A[3] = 1, t->A[1] = t->A[2] = 0;
+    t->var_cut += (t->cov[0] + t->cov[2]) / 2;
+    v->report.cut_anew++;
+}
+
+bool plr_track_follow(plr_vision *v, const plr_scene *s, plr_track *t) {
+    plr_fit fit;
+    const plr_real expected[2] = {t->at[0], t->at[1]};
+    const bool found = find(v, &s->side[PLR_LEFT], (const uint8_t(*)[PLR_PATCH_BYTES])t->patch,
+                            t->levels - 1U, t->A, t->at, &fit);
+    if (!found)
+        return end(t, !fit.inside  ? PLR_TRACK_LEFT_VIEW
+                      : !fit.ended ? PLR_TRACK_MOVED
+                                   : PLR_TRACK_UNLIKE);
+    memcpy(t->cov, fit.cov, sizeof fit.cov);
+    for (int i = 0; i < 2; i++)
+        t->drift[i] += t->at[i] - expected[i];
+    t->likeness = fit.likeness;
+    const plr_real d = det(t->A);
+    if (d < SMALLEST || d > LARGEST)
+        cut_anew(v, s, t);
+    return true;
+}
+
+bool plr_track_begin(const plr_vision *v, const plr_scene *s, plr_track *t, const plr_real at[2]) {
+    plr_template template;
+    memset(t, 0, sizeof *t);
+    t->at[0] = at[0], t->at[1] = at[1];
+    t->A[0] = t->A[3] = 1;
+    t->likeness = 1;
+    t->levels = (uint8_t)cut(&s->side[PLR_LEFT], at, t->patch);
+    t->id = v->next_id;
+    return t->levels > 0 && plr_template_make(&template, t->patch[0]);
+}
+
+/* --- from left to right --- */
+
+enum { SEARCH_WIDEST = 200 }; /* px of the level in which the epipolar line is searched */
+
+#define LIKE_SEARCH PLR_R(0.7)
+#define SECOND_BEST PLR_R(0.95) /* of the best: else two places are alike */
+#define ROW_GAP     PLR_R(1.5)  /* px of the virtual camera */
+
+/* A place in the right picture by the left patch, cut now: the two share exposure and view. */
+static bool fit_right(plr_vision *v, const plr_scene *s, const uint8_t (*patch)[PLR_PATCH_BYTES],
+                      unsigned from, const plr_real A[4], plr_track *t, plr_real at[2]) {
+    plr_fit fit;
+    plr_real X[3], left[2], right[2];
+    if (!find(v, &s->side[PLR_RIGHT], patch, from, A, at, &fit) ||
+        !plr_rig_point(v, &s->motion, PLR_LEFT, t->at, plr_rig_depth(v, t->disparity), X))
+        return false;
+    plr_rig_virtual(v, PLR_LEFT, X, left);
+    if (!plr_rig_point(v, &s->motion, PLR_RIGHT, at, plr_rig_depth(v, t->disparity), X))
+        return false;
+    plr_rig_virtual(v, PLR_RIGHT, X, right);
+    if (plr_abs(left[1] - right[1]) > ROW_GAP)
+        return false;
+    t->disparity = left[0] - right[0];
+    t->right[0] = at[0], t->right[1] = at[1];
+    t->var_right = fit.cov[0];
+    return true;
+}
+
+/* The two likeliest places along the line. */
+typedef struct plr_candidates {
+    plr_real best, best_disparity, second;
+} plr_candidates;
+
+/* Keeps the best, and the best of those more than two steps away from it. */
+static void keep(plr_candidates *c, plr_real likeness, plr_real disparity, plr_real step) {
+    const bool beside = plr_abs(disparity - c->best_disparity) < PLR_R(2.5) * step;
+    if (likeness > c->best) {
+        if (!beside && c->best > c->second)
+            c->second = c->best;
+        c->best = likeness, c->best_disparity = disparity;
+    } else if (!beside && likeness > c->second) {
+        c->second = likeness;
+    }
+}
+
+static unsigned search_level(const plr_vision *v, unsigned levels) {
+    unsigned level = 0;
+    while (level + 1 < levels && v->width >> level > SEARCH_WIDEST)
+        level++;
+    return level;
+}
+
+/* Where along the epipolar line the patch is likeliest; `mirror`: on the other side of infinity. */
+static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t, const uint8_t *patch,
+                        unsigned level, bool mirror, plr_real *disparity) {
+    plr_template template;
+    plr_candidates c = {-1, -1000, -1};
+    plr_real infinity[2], A[4];
+    const plr_real step = (plr_real)(1U << level);
+    const plr_image *image = &s->side[PLR_RIGHT].level[level];
+    if (!plr_template_make(&template, patch) ||
+        !plr_rig_across(v, &s->motion, t->at, 0, infinity, A))
+        return false;
+    for (plr_real d = mirror ? 4 * step : 0; d <= (plr_real)v->disparity_max; d += step) {
+        plr_real at[2];
+        if (!plr_rig_across(v, &s->motion, t->at, d, at, NULL))
+            continue;
+        for (int i = 0; i < 2; i++)
+            at[i] = plr_pyramid_down(mirror ? 2 * infinity[i] - at[i] : at[i], level);
+        keep(&c, plr_patch_likeness(image, &template, at, A), d, step);
+    }
+    *disparity = c.best_disparity;
+    return c.best > LIKE_SEARCH && c.second < SECOND_BEST * c.best;
+}
+
+bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool birth) {
+    uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
+    const uint8_t(*const kept)[PLR_PATCH_BYTES] = (const uint8_t(*)[PLR_PATCH_BYTES])patch;
+    plr_real at[2], A[4];
+    const unsigned levels = cut(&s->side[PLR_LEFT], t->at, patch);
+    if (levels == 0)
+        return false;
+    const unsigned level = search_level(v, levels), from = level > 0 ? 1 : 0;
+    if (!birth)
+        return plr_rig_across(v, &s->motion, t->at, t->disparity, at, A) &&
+               fit_right(v, s, kept, from, A, t, at);
+    plr_real disparity;
+    if (!search_line(v, s, t, kept[level], level, false, &disparity) ||
+        !plr_rig_across(v, &s->motion, t->at, disparity, at, A))
+        return false;
+    t->disparity = disparity;
+    return fit_right(v, s, kept, level, A, t, at);
+}
+
+bool plr_track_mirrored(plr_vision *v, const plr_scene *s, const plr_track *t) {
+    plr_real disparity;
+    const unsigned level = search_level(v, t->levels);
+    return search_line(v, s, t, t->patch[level], level, true, &disparity);
+}

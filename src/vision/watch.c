@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+#include "vision/watch.h"
+
+#include <string.h>
+
+#include "math/small.h"
+
+/* Grey levels of a picture in which nothing is seen. */
+enum { DARK = 6, BRIGHT = 249, LEAST_VARIANCE = 2, LEAST_TRACKS = 8 };
+
+/* A pair's weight falls to a half in some hundred pairs. */
+#define KEEP PLR_R(0.993)
+/* Less tells nothing of a delay: rows that move by a few px per second, in all. */
+#define LEAST_RATE2 PLR_R(100)
+
+/* FNV-1a of a level's words. */
+static uint32_t hash_of(const plr_image *image) {
+    uint32_t hash = 2166136261U;
+    for (unsigned y = 0; y < image->height; y++) {
+        const uint8_t *row = image->pixels + y * image->stride;
+        unsigned x = 0;
+        for (; x + 4 <= image->width; x += 4) {
+            const uint32_t word = (uint32_t)row[x] | (uint32_t)row[x + 1] << 8 |
+                                  (uint32_t)row[x + 2] << 16 | (uint32_t)row[x + 3] << 24;
+            hash = (hash ^ word) * 16777619U;
+            hash ^= hash >> 15;
+        }
+        for (; x < image->width; x++)
+            hash = (hash ^ row[x]) * 16777619U;
+    }
+    return hash;
+}
+
+/* Of the coarsest level: its mean and variance are the picture's, less its noise. */
+static uint8_t light(const plr_image *image) {
+    uint32_t sum = 0;
+    uint64_t squares = 0;
+    for (unsigned y = 0; y < image->height; y++)
+        for (unsigned x = 0; x < image->width; x++) {
+            const uint32_t grey = image->pixels[y * image->stride + x];
+            sum += grey, squares += grey * grey;
+        }
+    const uint64_t n = (uint64_t)image->width * image->height, mean = sum / n;
+    const uint64_t variance = (squares - (uint64_t)sum * sum / n) / n;
+    if (variance >= LEAST_VARIANCE * 8)
+        return 0;
+    if (mean < DARK)
+        return PLR_PICTURE_DARK;
+    if (mean > BRIGHT)
+        return PLR_PICTURE_BRIGHT;
+    return variance < LEAST_VARIANCE ? PLR_PICTURE_FLAT : 0;
+}
+
+uint8_t plr_watch_picture(const plr_levels *l, uint32_t *hash, bool first) {
+    const uint32_t now = hash_of(&l->level[l->count > 1 ? 1 : 0]);
+    uint8_t faults = light(&l->level[l->count - 1]);
+    if (!first && now == *hash)
+        faults |= PLR_PICTURE_REPEATED;
+    *hash = now;
+    return faults;
+}
+
+/* Sums over the seen tracks: px by which the right row is lower, and px/s by which it moves. */
+static unsigned rows_of(const plr_vision *v, const plr_expected_motion *m, plr_real *gap,
+                        plr_real *rate) {
+    unsigned n = 0;
+    for (unsigned i = 0; i < v->track_count; i++) {
+        const plr_track *t = &v->tracks[i];
+        const plr_real depth = plr_rig_depth(v, t->disparity);
+        plr_real L[3], R[3], left[2], right[2], turn[3];
+        if (!t->seen || !plr_rig_point(v, m, PLR_LEFT, t->at, depth, L) ||
+            !plr_rig_point(v, m, PLR_RIGHT, t->right, depth, R))
+            continue;
+        plr_rig_virtual(v, PLR_LEFT, L, left);
+        plr_rig_virtual(v, PLR_RIGHT, R, right);
+        plr_cross3(turn, m->w, L);
+        const plr_real y = (turn[1] + m->u[1]) / L[2], z = (turn[2] + m->u[2]) / L[2];
+        *gap += right[1] - left[1];
+        *rate += PLR_FMA(v->fy, y, -((left[1] - v->cy) * z));
+        n++;
+    }
+    return n;
+}
+
+/* Later by s, the right rows differ by s times their rate, beside what the calibration makes constant. */
+static void tell_delay(plr_vision *v) {
+    const plr_row_gaps *g = &v->gaps;
+    const plr_real rate2 = PLR_FMA(-g->rate, g->rate / g->count, g->rate2);
+    const plr_real gap_rate = PLR_FMA(-g->rate, g->gap / g->count, g->gap_rate);
+    const plr_real gap2 = PLR_FMA(-g->gap, g->gap / g->count, g->gap2);
+    if (!(g->count > 10) || !(rate2 > LEAST_RATE2))
+        return;
+    const plr_real delay = gap_rate / rate2, rest = PLR_FMA(-delay, gap_rate, gap2);
+    v->report.halves_apart_s = (float)delay;
+    v->report.halves_sigma_s = (float)PLR_SQRT((rest > 0 ? rest : 0) / (g->count - 2) / rate2);
+}
+
+void plr_watch_rows(plr_vision *v, const plr_expected_motion *m) {
+    plr_row_gaps *g = &v->gaps;
+    plr_real gap = 0, rate = 0;
+    const unsigned n = m->known ? rows_of(v, m, &gap, &rate) : 0;
+    if (n >= LEAST_TRACKS) {
+        gap /= (plr_real)n, rate /= (plr_real)n;
+        g->count = PLR_FMA(KEEP, g->count, PLR_R(1));
+        g->rate = PLR_FMA(KEEP, g->rate, rate), g->gap = PLR_FMA(KEEP, g->gap, gap);
+        g->rate2 = PLR_FMA(KEEP, g->rate2, rate * rate);
+        g->gap_rate = PLR_FMA(KEEP, g->gap_rate, gap * rate);
+        g->gap2 = PLR_FMA(KEEP, g->gap2, gap * gap);
+    }
+    tell_delay(v);
+}

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""Eyes (src/vision) on real pictures, beside OpenCV's tracker in the same chain.
+
+usage: eyes.py [--bin build/bin] [--starts 10] [--opencv]
+
+EuRoC MH_01's first ten seconds of $PELORUS_DATA (by default ../shared/data), whole and halved
+once and twice; the gyro alone predicts, with its bias in it; settings of
+tools/config/imu-adis16448.conf. Several starts, each a tenth of a second later: medians. An absent
+recording is left out.
+
+err0, ATE   mm, as `pelorus evaluate` has them
+NEES/6      mean; 1 is expected
+worst       the largest err0 of the starts
+tracks      observations a pair, and the mean length of a track in pairs
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import judge
+import numpy as np
+from numpy.typing import NDArray
+from pelorus import trajectory
+from pelorus.converters import euroc, streams
+from pelorus.converters.streams import Asked, Pictures, Readings, Streams
+from pelorus.eyes import Tracker
+from pelorus.frames import Camera
+from pelorus.inertial import Inertial
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.recording import Recording
+from pelorus.rig.lens import Lens
+from pelorus.tracks import Tracks
+from scipy.spatial.transform import Rotation
+
+FOLDER = "images/euroc-mh01-start"
+SIZES = ((1, 60), (2, 50), (4, 50))  # halved so often, points
+FRAMES_APART = 2  # of two starts: a tenth of a second
+Gray = NDArray[np.uint8]
+
+
+def shrunk(lens: Lens, times: int) -> Lens:
+    """The lens of pictures whose squares of so many pixels have become one."""
+    fx, fy, cx, cy = lens.intrinsics
+    four = (fx / times, fy / times, (cx + 0.5) / times - 0.5, (cy + 0.5) / times - 0.5)
+    size = lens.width_px // times, lens.height_px // times
+    return replace(lens, intrinsics=four).sized(*size)
+
+
+def small(picture: Gray, times: int) -> Gray:
+    """The means of squares of so many pixels a side."""
+    rows, columns = (side // times for side in picture.shape)
+    squares = picture[: rows * times, : columns * times].reshape(rows, times, columns, times)
+    return np.ascontiguousarray(np.round(squares.mean((1, 3))).astype(np.uint8))
+
+
+def turns(t_ns: Times, readings: Inertial, R_CB: Floats) -> list[Floats]:
+    """How points are expected to turn in the camera from each pair to the next, by the gyro."""
+    found = []
+    for begin, end in pairwise(t_ns.tolist()):
+        between = (readings.t_ns >= begin) & (readings.t_ns < end)
+        theta = readings.w_B_radps[between].mean(axis=0) * (end - begin) * 1e-9
+        found.append(R_CB @ Rotation.from_rotvec(theta).as_matrix().T @ R_CB.T)
+    return found
+
+
+def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]:
+    """The recording as eyes see it, and the mean length of a track."""
+    assert found.calibrated.rig is not None
+    assert isinstance(found.frames, Pictures)
+    assert isinstance(found.motion, Readings)
+    rig = found.calibrated.rig
+    rig = replace(rig, left=shrunk(rig.left, times), right=shrunk(rig.right, times))
+    assert rig.T_LB is not None
+    tracker = Tracker(rig, tracks=points)
+    camera = tracker.calibration(rig.T_LB.R, rig.T_LB.p)
+    t_ns = rig.on_body_clock(found.frames.t_ns)
+    R = np.asarray(camera.R_CB)
+    motion = [None, *((turn, np.zeros(3)) for turn in turns(t_ns, found.motion.inertial, R))]
+    seen = [
+        tracker.track(int(t), small(left, times), small(right, times), motion=moved)
+        for t, (left, right), moved in zip(t_ns, found.frames.read(), motion, strict=True)
+    ]
+    frame = np.repeat(np.arange(len(seen)), [len(one.observations) for one in seen])
+    id = np.concatenate([one.observations["id"] for one in seen]).astype(np.int64)
+    pixels = np.concatenate([one.pixels for one in seen]).astype(np.float64)
+    tracks = Tracks.from_rows(len(seen), frame, id, pixels)
+    five = (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.baseline_m)
+    header = replace(
+        found.calibrated.header, camera=Camera(*five), R_CB=R, t_CB_m=np.asarray(camera.t_CB_m),
+        image_width_px=rig.left.width_px, image_height_px=rig.left.height_px,
+    )  # fmt: skip
+    of_tracks = replace(found, frames=streams.Seen(Path(), t_ns, tracks))
+    made = streams._with_motion(header, of_tracks, t_ns, tracks)
+    assert found.truth is not None
+    truth = streams._at_frames(found.truth, t_ns)
+    lengths = np.bincount(id)
+    return made.with_truth(truth.t_ns, truth.poses), float(lengths[lengths > 0].mean())
+
+
+def later(drive: Recording, first: int) -> Recording:
+    """The same from a frame on."""
+    begin = drive.frame_t_ns[first]
+    rows, own, true = drive.tracks.frame >= first, drive.inertial, drive.truth_t_ns >= begin
+    kept = own.t_ns >= begin - 10_000_000
+    tracks = Tracks(
+        drive.tracks.frame_count - first, drive.tracks.frame[rows] - first, drive.tracks.id[rows],
+        drive.tracks.pixels[rows],
+    )  # fmt: skip
+    return replace(
+        drive, frame_t_ns=drive.frame_t_ns[first:], tracks=tracks,
+        inertial=Inertial(own.t_ns[kept], own.a_B_mps2[kept], own.w_B_radps[kept]),
+        truth_t_ns=drive.truth_t_ns[true], truth=drive.truth.at(true),
+    )  # fmt: skip
+
+
+def tell(name: str, drive: Recording, starts: int, program: Path, length: float) -> None:
+    """A row of the table."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for k in range(starts):
+            plr = Path(folder) / "drive.plr"
+            later(drive, k * FRAMES_APART).write(plr)
+            found = judge.figures(judge.run(program, plr, judge.conf("imu-adis16448")))
+            rows.append([1e3 * found["err0"], 1e3 * found["ATE"], found["NEES/6"]])
+    err0, ate, nees = np.median(rows, axis=0)
+    a_pair = len(drive.tracks) / drive.tracks.frame_count
+    worst = max(row[0] for row in rows)
+    print(
+        f"{name:22}{err0:7.1f}{ate:7.1f}{nees:8.2f}{worst:8.1f}{a_pair:8.0f} x {length:.1f}",
+        flush=True,
+    )
+
+
+def main() -> int:
+    """Prints the table."""
+    parser = judge.parser_of(__doc__, "unused")
+    parser.add_argument("--starts", type=int, default=10)
+    parser.add_argument("--opencv", action="store_true", help="its tracker, too")
+    given = parser.parse_args()
+    folder = judge.DATA / FOLDER
+    if not folder.is_dir():
+        print(f"{folder}: is not here, and left out")
+        return 0
+    found = euroc.read(folder, Asked(truth=trajectory.read_truth(folder / "truth.tum")))
+    program = given.bin / "pelorus-replay"
+    print(f"{'':22}{'err0':>7}{'ATE':>7}{'NEES/6':>8}{'worst':>8}{'tracks':>10}")
+    for times, points in SIZES:
+        name = f"{752 // times} x {480 // times}, {points} points"
+        drive, length = followed(found, times, points)
+        tell(name, drive, given.starts, program, length)
+    if given.opencv:
+        drive = streams.recording(found)
+        lengths = np.bincount(drive.tracks.id)
+        tell("752 x 480, OpenCV", drive, given.starts, program, float(lengths.mean()))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+/* Patches: kernels beside their twins, and places that are known exactly. */
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#include "support/pictures.h"
+#include "support/vision_twin.h"
+#include "vision/patch.h"
+#include "vision/pyramid.h"
+
+enum { W = 64, H = 48, U = 32, V = 24 }; /* and the middle */
+
+static uint8_t first[W * H], second[W * H];
+static texture scene;
+static rng chance;
+
+void setUp(void) {
+    chance = rng_seeded(482);
+    scene = texture_of(1);
+}
+
+static plr_image image_of(const uint8_t *pixels) {
+    const plr_image image = {pixels, W, W, H};
+    return image;
+}
+
+static void randomise(uint8_t *pixels, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        pixels[i] = (uint8_t)rng_uniform(&chance, 0, 256);
+}
+
+/* --- twins --- */
+
+static void test_halving_is_sixteen_products_a_pixel_for_every_size(void) {
+    static uint8_t fast[W * H], plain[W * H];
+    randomise(first, W * H);
+    for (unsigned width = 2; width <= W; width += width < 20 ? 1 : 5)
+        for (unsigned height = 2; height < 12; height++) {
+            const plr_image in = {first, W, (uint16_t)width, (uint16_t)height};
+            memset(fast, 7, sizeof fast), memset(plain, 7, sizeof plain);
+            plr_pyramid_halve(&in, fast);
+            plain_halve(&in, plain);
+            TEST_ASSERT_EQUAL_MEMORY(plain, fast, sizeof fast);
+        }
+}
+
+static void test_halving_keeps_a_place_where_the_levels_say_that_it_is(void) {
+    const view how = view_at(0, 0);
+    render(first, W, H, W, &scene, &how, &chance);
+    plr_levels l;
+    const plr_picture picture = {first, W, W, H, 0};
+    plr_pyramid_build(&l, &picture, 2, second);
+    for (unsigned v = 4; v < 20; v += 3)
+        for (unsigned u = 4; u < 28; u += 3) {
+            double mean = 0; /* weights 1 3 3 1 about 2 u + 1/2 */
+            static const double weight[4] = {1, 3, 3, 1};
+            for (int j = 0; j < 4; j++)
+                for (int i = 0; i < 4; i++)
+                    mean += weight[j] * weight[i] / 64 *
+                            (40 * texture_at(&scene, 2.0 * u - 1 + i, 2.0 * v - 1 + j) + 128);
+            TEST_ASSERT_DOUBLE_WITHIN(1.2, mean, second[v * (W / 2) + u]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2 * u + 0.5, (double)plr_pyramid_up((plr_real)u, 1));
+        }
+}
+
+static void test_sums_are_those_of_the_plain_twin(void) {
+    uint8_t patch[PLR_PATCH_BYTES];
+    randomise(first, W * H);
+    const plr_image image = image_of(first);
+    for (int run = 0; run < 2000; run++) {
+        plr_template t;
+        plr_grid g;
+        plr_patch_sums fast, plain;
+        randomise(patch, sizeof patch);
+        if (run % 10 == 0) /* extremes: all that is summed at its largest */
+            for (unsigned i = 0; i < sizeof patch; i++)
+                patch[i] = first[i] = rng_below(&chance, 2) ? 255 : 0;
+        TEST_ASSERT_TRUE(plr_template_make(&t, patch));
+        const plr_real at[2] = {(plr_real)rng_uniform(&chance, -2, W + 2),
+                                (plr_real)rng_uniform(&chance, -2, H + 2)};
+        plr_real A[4];
+        for (int i = 0; i < 4; i++)
+            A[i] = (plr_real)rng_uniform(&chance, -1.5, 1.5);
+        if (!plr_grid_place(&g, &image, at, A))
+            continue;
+        plr_patch_sum(&fast, &image, &g, &t);
+        plain_patch_sum(&plain, &image, &g, &t);
+        TEST_ASSERT_EQUAL_MEMORY(&plain, &fast, sizeof fast);
+    }
+}
+
+/* --- places --- */
+
+/* Finds the patch that is cut in the middle of the first picture in the second: the error in px. */
+static double error_of(const view *how, const plr_real A[4], const double begin[2],
+                       const double truth[2], plr_fit *fit) {
+    uint8_t patch[PLR_PATCH_BYTES];
+    plr_template t;
+    const plr_real middle[2] = {U, V};
+    const plr_image one = image_of(first), two = image_of(second);
+    render(second, W, H, W, &scene, how, &chance);
+    TEST_ASSERT_TRUE(plr_patch_cut(&one, middle, patch));
+    TEST_ASSERT_TRUE(plr_template_make(&t, patch));
+    fit->at[0] = (plr_real)begin[0], fit->at[1] = (plr_real)begin[1];
+    plr_patch_fit(fit, &two, &t, A, 20);
+    return hypot((double)fit->at[0] - truth[0], (double)fit->at[1] - truth[1]);
+}
+
+static const plr_real one_to_one[4] = {1, 0, 0, 1};
+
+static void test_shifts_below_a_pixel_are_found_to_a_twentieth_of_one(void) {
+    const view as_is = view_at(0, 0);
+    render(first, W, H, W, &scene, &as_is, &chance);
+    double worst = 0, sum2 = 0;
+    for (int run = 0; run < 100; run++) {
+        const double x = rng_uniform(&chance, -1.5, 1.5), y = rng_uniform(&chance, -1.5, 1.5);
+        const double truth[2] = {U - x, V - y}, begin[2] = {U, V};
+        const view how = view_at(x, y);
+        plr_fit fit;
+        const double error = error_of(&how, one_to_one, begin, truth, &fit);
+        TEST_ASSERT_TRUE(fit.inside && fit.ended);
+        worst = fmax(worst, error), sum2 += error * error;
+    }
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, sqrt(sum2 / 100));
+}
+
+static void test_gain_and_offset_of_the_exposure_do_not_move_a_place(void) {
+    const view as_is = view_at(0, 0);
+    render(first, W, H, W, &scene, &as_is, &chance);
+    for (int run = 0; run < 40; run++) {
+        view how = view_at(0.4, -0.3);
+        how.gain = rng_uniform(&chance, 20, 60), how.offset = rng_uniform(&chance, 100, 150);
+        const double truth[2] = {U - 0.4, V + 0.3}, begin[2] = {U, V};
+        plr_fit fit;
+        TEST_ASSERT_LESS_THAN_DOUBLE(0.08, error_of(&how, one_to_one, begin, truth, &fit));
+        TEST_ASSERT_GREATER_THAN_DOUBLE(0.98, (double)fit.likeness);
+    }
+}
+
+static void test_a_warp_that_is_told_is_followed_and_one_that_is_not_shows(void) {
+    const view as_is = view_at(0, 0);
+    render(first, W, H, W, &scene, &as_is, &chance);
+    /* the second picture is larger by 1.25 and turned by 0.2 rad about the middle */
+    const double c = cos(0.2) / 1.25, s = sin(0.2) / 1.25;
+    view how = view_at(U - c * U + s * V, V - s * U - c * V);
+    how.A[0] = how.A[3] = c, how.A[1] = -s, how.A[2] = s;
+    const plr_real A[4] = {(plr_real)(1.25 * cos(0.2)), (plr_real)(1.25 * sin(0.2)),
+                           (plr_real)(-1.25 * sin(0.2)), (plr_real)(1.25 * cos(0.2))};
+    const double truth[2] = {U, V}, begin[2] = {U + 0.7, V - 0.5};
+    plr_fit told, untold;
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.08, error_of(&how, A, begin, truth, &told));
+    (void)error_of(&how, one_to_one, begin, truth, &untold);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.99, (double)told.likeness);
+    TEST_ASSERT_LESS_THAN_DOUBLE((double)told.likeness - 0.01, (double)untold.likeness);
+}
+
+/* The told covariance is that of the errors, where noise is all that is wrong. */
+static void test_the_told_uncertainty_is_that_of_the_errors(void) {
+    double squares = 0, worst = 0;
+    const int runs = 300;
+    for (int run = 0; run < runs; run++) {
+        view as_is = view_at(run * 11.0, 0), how = as_is;
+        as_is.noise = how.noise = 4;
+        how.at[0] += 0.3, how.at[1] -= 0.6;
+        render(first, W, H, W, &scene, &as_is, &chance);
+        const double truth[2] = {U - 0.3, V + 0.6}, begin[2] = {U, V};
+        plr_fit fit;
+        const double error = error_of(&how, one_to_one, begin, truth, &fit);
+        const double d2 = error * error / (double)(fit.cov[0] + fit.cov[2]);
+        squares += d2 / runs, worst = fmax(worst, d2);
+    }
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.7, squares);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.4, squares);
+    TEST_ASSERT_LESS_THAN_DOUBLE(25, worst);
+}
+
+static void test_what_lies_outside_is_said_and_not_read(void) {
+    const plr_image image = image_of(first);
+    uint8_t patch[PLR_PATCH_BYTES];
+    const plr_real edges[6][2] = {{PLR_R(4.9), V}, {U, PLR_R(4.9)}, {W - 6, V},
+                                  {U, H - 6},      {-1000, -1000},  {PLR_R(1e9), PLR_R(1e9)}};
+    for (int i = 0; i < 6; i++)
+        TEST_ASSERT_FALSE(plr_patch_cut(&image, edges[i], patch));
+    const plr_real nan[2] = {(plr_real)NAN, V}, huge[4] = {PLR_R(1e30), 0, 0, 1};
+    const plr_real middle[2] = {U, V};
+    plr_grid g;
+    TEST_ASSERT_FALSE(plr_patch_cut(&image, nan, patch));
+    TEST_ASSERT_FALSE(plr_grid_place(&g, &image, nan, one_to_one));
+    TEST_ASSERT_FALSE(plr_grid_place(&g, &image, middle, huge));
+    TEST_ASSERT_TRUE(plr_patch_cut(&image, middle, patch));
+}
+
+static void test_a_patch_without_contrast_in_both_directions_is_refused(void) {
+    uint8_t patch[PLR_PATCH_BYTES];
+    plr_template t;
+    memset(patch, 90, sizeof patch);
+    TEST_ASSERT_FALSE(plr_template_make(&t, patch));
+    for (unsigned i = 0; i < sizeof patch; i++) /* an edge */
+        patch[i] = i % PLR_PATCH_KEPT < 5 ? 40 : 200;
+    TEST_ASSERT_FALSE(plr_template_make(&t, patch));
+    patch[60] = 0, patch[61] = 0, patch[71] = 0;
+    TEST_ASSERT_TRUE(plr_template_make(&t, patch));
+}
