@@ -81,7 +81,7 @@ extern "C" {
 #define PLR_VISION 1
 #endif
 
-/* Of vision.h alone: most pixels of a picture (default 320 x 240), most points that are followed, 1 to 1024
+/* Of vision.h alone: most pixels of a picture (default 76800, 320 x 240), most points that are followed, 1 to 1024
  * (default 50), and most levels of a pyramid, 1 to 6 (default 4). The pair's pictures are the caller's;
  * beside them a plr_vision takes 2/3 of a picture, and 121 bytes a level and some 200 for each point. */
 #ifndef PLR_VISION_PIXELS
