@@ -86,6 +86,15 @@ def test_a_turn_beyond_its_prior_names_the_setting(turned: Path) -> None:
     assert own.is_doubtful
 
 
+def test_a_part_that_the_filter_put_back_is_named(turned: Path) -> None:
+    log = log_of(turned, "--camera-turn-sigma", "0.01")
+    told = found(log).told
+    own = found([*log, replace(told, estimated=told.estimated & ~1)])
+    assert own.refused == ("baseline",)
+    assert "refused baseline" in own.words()
+    assert own.is_doubtful
+
+
 def test_a_calibration_that_is_right_is_said_to_be(turned: Path) -> None:
     own = found(log_of(turned, "--camera-turn-sigma", "0.01"))
     right = replace(own, told=replace(own.told, corrected=np.zeros(11)))

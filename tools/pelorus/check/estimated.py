@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.calibrated import Calibrated, Part, last_calibrated
+from pelorus.calibrated import PARTS, Calibrated, Part, last_calibrated
 from pelorus.check.calibration import Calibration
 from pelorus.check.mount import SURE, Turned
 from pelorus.check.options import Settings
 from pelorus.frames import Message
 from pelorus.layout import Floats
-from pelorus.settings import in_force
+from pelorus.schema import SETTINGS
+from pelorus.settings import IDS, in_force
 
 TOLD = 3.0  # sigmas from which a correction is worth naming
 OFF_PRIOR = 4.0  # sigmas of the prior, as the filter's own reason CALIBRATION_OFF
@@ -33,12 +34,14 @@ PRIORS = {
 
 @dataclass(frozen=True)
 class Estimated:
-    """`off`: settings whose sigma the estimate is far beyond. `apart`: the search sees the camera
-    turned otherwise, by so many sigmas.
+    """`off`: settings whose sigma the estimate is far beyond. `refused`: parts that the filter was
+    asked to estimate, and put back (CALIBRATION_OFF). `apart`: the search sees the camera turned
+    otherwise, by so many sigmas.
     """
 
     told: Calibrated
     off: tuple[str, ...]
+    refused: tuple[str, ...]
     apart: float | None  # None: it has seen none, or the turn is not estimated
 
     @property
@@ -51,10 +54,17 @@ class Estimated:
         parts = list(self.told.parts())
         clear = [_with_sigma(*part) for part in parts if abs(part[1]) > TOLD * part[2]]
         said = "the filter estimates the calibration on the way"
-        if not clear:
+        if self.refused:
+            said += (
+                f", and refused {', '.join(self.refused)}: the drive would move it farther than "
+                "what is learnt of it allows. The IMU's scale, axes or clock look so, or a "
+                "calibration that is off by many sigmas: calibrate, or leave it out of calibrate"
+            )
+        elif not clear:
             known = ", ".join(f"{part.name} to {sigma:.2g} {part.unit}" for part, _, sigma in parts)
             return f"{said} and finds it right: {known}"
-        said += f", corrected by {', '.join(clear)}"
+        if clear:
+            said += f"; corrected by {', '.join(clear)}"
         if self.off:
             said += (
                 f": more than {OFF_PRIOR:.0f} sigma by {', '.join(self.off)}. If the drive is "
@@ -67,7 +77,7 @@ class Estimated:
 
     @property
     def is_doubtful(self) -> bool:
-        return bool(self.off) or (self.apart or 0.0) > SURE
+        return bool(self.off or self.refused) or (self.apart or 0.0) > SURE
 
 
 def _with_sigma(part: Part, value: float, sigma: float) -> str:
@@ -77,7 +87,9 @@ def _with_sigma(part: Part, value: float, sigma: float) -> str:
 def estimated(messages: Sequence[Message], found: Calibration) -> Estimated | None:
     """Of a run; None where nothing is estimated."""
     told = last_calibrated(messages)
-    return None if told is None else Estimated(told, _off(messages, told), _apart(told, found.turn))
+    if told is None:
+        return None
+    return Estimated(told, _off(messages, told), _refused(messages, told), _apart(told, found.turn))
 
 
 def _off(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
@@ -90,6 +102,18 @@ def _settings_off(messages: Sequence[Message], told: Calibrated) -> Iterator[str
         si = value / (1.0 if part.unit == "px" else part.scale)
         if abs(si) > OFF_PRIOR * (in_force(messages, setting) or np.inf):
             yield setting
+
+
+def _refused(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
+    """What the setting calibrate names, and is not estimated in the end."""
+    asked = int(in_force(messages, "calibrate") or 0)
+    words = SETTINGS[IDS["calibrate"]].words
+    parts = [(part.key.partition("_")[0], told.estimated >> k & 1) for k, part in enumerate(PARTS)]
+    return tuple(
+        word
+        for bit, word in enumerate(words)
+        if asked >> bit & 1 and not all(on for of, on in parts if of == word)
+    )
 
 
 def _apart(told: Calibrated, turn: Turned | None) -> float | None:
