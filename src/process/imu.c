@@ -258,12 +258,11 @@ static plr_real density_of(const plr_filter *f, unsigned which) {
 /* What three numbers of this variance each exceed once in a million. */
 #define UNLIKELY PLR_R(30)
 
-/* The densities of a step's noise. A force that accelerates the body by more than its own weight, and more
+/* The densities of a step's noise. A force that accelerates the body by more than its own weight, and by more
  * than scatter does, is a shock: the reading may be wrong by all of that, for as long as any error lasts, and the
- * gyro, which took the same blow, by all that it reads. It is that
- * of the whole interval: what is left of one that a frame cut makes up for rounded stamps too. A reading held
- * for longer than usual is wrong by what changes meanwhile: at first as successive readings differ, later as they
- * scatter at all. */
+ * gyro, which took the same blow, by all that it reads. The force is that of the whole interval: the rest of one
+ * that a frame cut makes up for rounded stamps, too. A reading held for longer than usual is wrong by what
+ * changes meanwhile: at first as successive readings differ, later as they scatter at all. */
 static void densities(const plr_filter *f, const plr_step *by, const plr_real gamma[3],
                       plr_real density[2]) {
     const plr_inertial *at = &f->inertial;

@@ -16,14 +16,12 @@ enum { PLR_READING_DIM = PLR_POSE_DIM };
 /* A reading that is held for more of the usual intervals than this is no mean any more. */
 #define PLR_LONG_INTERVALS PLR_R(2.5)
 
-/* A reading that moves the state for `seconds`. */
+/* A reading that moves the state for `seconds`. `mean` is that of the readings over the step, `whole` that over the
+ * interval which the step ends: another one only where a frame cut that. The reading stands for `interval`
+ * seconds, so that the parts of it add up to the noise of the whole. */
 typedef struct plr_step {
-    plr_real mean[PLR_READING_DIM]; /* of the readings over the step */
-    plr_real whole
-        [PLR_READING_DIM]; /* over the interval that the step ends: `mean`, unless a frame cut it */
-    plr_real seconds;
-    plr_real
-        interval; /* for which the reading stands: its parts add up to the noise of the whole */
+    plr_real mean[PLR_READING_DIM], whole[PLR_READING_DIM];
+    plr_real seconds, interval;
 } plr_step;
 
 typedef struct plr_process {

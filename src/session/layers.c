@@ -5,10 +5,10 @@
 
 /* With an IMU, where nothing else is said: the prior of its gyro's bias, rad/s, for real parts have so much (the
  * setting's default is for a gyro beside wheels, which has been calibrated); and by how much the times of
- * pictures and readings may differ, s: a trigger and an exposure are hardly known better. */
-#define IMU_BIAS_GYRO 0.1
-#define IMU_CAMERA_CLOCK                                                                           \
-    (PLR_CALIBRATIONS > 5 ? 2e-3 : 0) /* else there is no room for its column */
+ * pictures and readings may differ, s, where a build has room for that column: a trigger and an exposure are
+ * hardly known better. */
+#define IMU_BIAS_GYRO    0.1
+#define IMU_CAMERA_CLOCK (PLR_CALIBRATIONS > 5 ? 2e-3 : 0)
 
 /* An axis without a value of its own has the one for all axes. */
 static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
