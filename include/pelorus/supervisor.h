@@ -160,10 +160,10 @@ typedef struct plr_supervisor {
     plr_real difference_noise; /* the expected square of difference_sigmas by noise alone */
     uint8_t doubt;             /* plr_doubt */
     uint8_t waits, holds_biases, settled; /* what the last frame did: plr_supervision */
-    uint8_t outright;      /* the last frame contradicted outright, and waits for the next */
+    uint8_t outright;        /* the last frame contradicted outright, and waits for the next */
     plr_time_ns outright_ns; /* since when */
-    uint8_t relocated;     /* the pose was found anew since it came into doubt */
-    uint8_t settle_frames; /* frames of agreement that end the doubt */
+    uint8_t relocated;       /* the pose was found anew since it came into doubt */
+    uint8_t settle_frames;   /* frames of agreement that end the doubt */
     /* in succession: */
     uint16_t agreeing_frames, contradicting_frames, doubted_frames;
 

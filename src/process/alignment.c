@@ -365,8 +365,8 @@ void plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
     average(at, t_ns, reading);
     const plr_time_ns stretch = t_ns - at->begin_ns;
     const plr_time_ns wait = at->seen_to_move ? REST_NS : MOVING_NS;
-    const bool may_move = kind == PLR_IMU_START_MOTION ||
-                          (kind == PLR_IMU_START_AUTO && t_ns - at->first_ns >= wait);
+    const bool may_move =
+        kind == PLR_IMU_START_MOTION || (kind == PLR_IMU_START_AUTO && t_ns - at->first_ns >= wait);
     bool started = false;
     if (stretch >= REST_NS && kind != PLR_IMU_START_MOTION)
         started = try_to_start(f, t_ns, true);

@@ -17,9 +17,8 @@ typedef enum swarm_blow {
 typedef struct swarm_drive {
     swarm_blow blow;
     unsigned points, slots, frame_hz, readings_per_frame;
-    double far_m; /* points stand between 1.5 m and this */
-    double
-        scatter_mps2; /* one sigma of the accelerometer; of the gyro a hundredth, rad/s */
+    double far_m;        /* points stand between 1.5 m and this */
+    double scatter_mps2; /* one sigma of the accelerometer; of the gyro a hundredth, rad/s */
     double hardest_mps2, hardest_radps, longest_s; /* of the blows */
 } swarm_drive;
 
