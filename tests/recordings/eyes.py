@@ -98,7 +98,7 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
     of_tracks = replace(found, frames=streams.Seen(Path(), t_ns, tracks))
     made = streams._with_motion(header, of_tracks, t_ns, tracks)
     assert found.truth is not None
-    truth = streams._at_frames(found.truth, t_ns)
+    truth = streams._at_frames(found.truth, t_ns, found.motion)
     lengths = np.bincount(id)
     return made.with_truth(truth.t_ns, truth.poses), float(lengths[lengths > 0].mean())
 
