@@ -83,7 +83,7 @@ static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
 }
 
-static void take_step(plr_filter *f, plr_time_ns t_ns, const plr_step *step) {
+static void take_step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *step) {
     plr_process_of(f)->step(f, t_ns, step);
     plr_calibration_note_step(f, step->mean, step->seconds);
 }
@@ -102,8 +102,8 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
     if (f->clock_started && t_ns > f->t_ns && plr_process_has_started(f)) {
         const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
         const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
-        plr_step step = {.seconds = plr_seconds(t_ns - f->t_ns),
-                         .interval = noise_interval(f, h0, h1)};
+        plr_process_step step = {.seconds = plr_seconds(t_ns - f->t_ns),
+                                 .interval = noise_interval(f, h0, h1)};
         plr_process_of(f)->hold(f, h0, step.mean);
         memcpy(step.whole, step.mean, sizeof step.whole);
         take_step(f, t_ns, &step);
@@ -158,7 +158,7 @@ plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
     planned.status = check_time(f, t_ns);
     if (planned.status != PLR_OK)
         return planned;
-    plr_step *step = &planned.step;
+    plr_process_step *step = &planned.step;
     plr_process_of(f)->mean(f, t_ns, reading, step);
     step->seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
     step->interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : step->seconds;
@@ -177,7 +177,7 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
         plr_guard_seal(f);
         return PLR_OK;
     }
-    const plr_step *step = &planned->step;
+    const plr_process_step *step = &planned->step;
     if (step->seconds > 0 && plr_process_has_started(f)) {
         take_step(f, t_ns, step);
         add_missed(f, step->interval - step->seconds, step->interval, reading);

@@ -12,8 +12,8 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns);
 
 /* The step that ends with a reading of the process (process/process.h). */
 typedef struct plr_planned_step {
-    plr_status status; /* PLR_OK, or why the reading is refused */
-    plr_step step;     /* seconds: since the filter's time; interval: since the last reading, or
+    plr_status status;     /* PLR_OK, or why the reading is refused */
+    plr_process_step step; /* seconds: since the filter's time; interval: since the last reading, or
                         * since the pose was set */
 } plr_planned_step;
 

@@ -263,7 +263,7 @@ static plr_real density_of(const plr_filter *f, unsigned which) {
  * gyro, which took the same blow, by all that it reads. The force is that of the whole interval: the rest of one
  * that a frame cut makes up for rounded stamps, too. A reading held for longer than usual is wrong by what
  * changes meanwhile: at first as successive readings differ, later as they scatter at all. */
-static void densities(const plr_filter *f, const plr_step *by, const plr_real gamma[3],
+static void densities(const plr_filter *f, const plr_process_step *by, const plr_real gamma[3],
                       plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
     const plr_real g = f->par.gravity, scatter2 = UNLIKELY * at->scatter2[0];
@@ -332,7 +332,7 @@ static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
 }
 
 static void move_noise(plr_filter *f, const plr_imu_step *s, const plr_real F[MOVED * DIM],
-                       const plr_step *by) {
+                       const plr_process_step *by) {
     const plr_real tau = s->tau;
     plr_real reading[2];
     densities(f, by, s->gamma, reading);
@@ -345,7 +345,7 @@ static void move_noise(plr_filter *f, const plr_imu_step *s, const plr_real F[MO
     }
 }
 
-static void step(plr_filter *f, plr_time_ns t_ns, const plr_step *by) {
+static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
     const plr_real seconds = by->seconds;
     plr_imu_step s;
     plr_real F[MOVED * DIM];
@@ -367,7 +367,7 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_step *by) {
 /* ---------------------------------------------------------------- readings */
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_step *step) {
+                 plr_process_step *step) {
     const bool makes_up = plr_seconds(t_ns - f->reading_ns) <= BRIDGED_S;
     plr_mean_reading(f, f->config.imu_timing, makes_up, t_ns, reading, step);
 }

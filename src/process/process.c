@@ -25,7 +25,7 @@ bool plr_step_is_possible(plr_real way2, plr_real turn2) {
 }
 
 void plr_mean_reading(const plr_filter *f, uint8_t timing, bool makes_up, plr_time_ns t_ns,
-                      const plr_real reading[PLR_READING_DIM], plr_step *step) {
+                      const plr_real reading[PLR_READING_DIM], plr_process_step *step) {
     const uint8_t when = f->reading_valid ? timing : PLR_TWIST_END;
     const bool cut = f->reading_valid && f->t_ns > f->reading_ns && t_ns > f->t_ns;
     /* of differences in ns, so that a short rest is as exact as a long one */

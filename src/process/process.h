@@ -19,10 +19,10 @@ enum { PLR_READING_DIM = PLR_POSE_DIM };
 /* A reading that moves the state for `seconds`. `mean` is that of the readings over the step, `whole` that over the
  * interval which the step ends: another one only where a frame cut that. The reading stands for `interval`
  * seconds, so that the parts of it add up to the noise of the whole. */
-typedef struct plr_step {
+typedef struct plr_process_step {
     plr_real mean[PLR_READING_DIM], whole[PLR_READING_DIM];
     plr_real seconds, interval;
-} plr_step;
+} plr_process_step;
 
 typedef struct plr_process {
     /* Lays out the state's blocks: plr_lay_out. */
@@ -33,11 +33,11 @@ typedef struct plr_process {
                         plr_real seconds);
 
     /* One step to t_ns. Sets the time. */
-    void (*step)(plr_filter *f, plr_time_ns t_ns, const plr_step *step);
+    void (*step)(plr_filter *f, plr_time_ns t_ns, const plr_process_step *step);
 
     /* Fills `mean` and `whole` of the step that ends with `reading`: plr_mean_reading. */
     void (*mean)(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_step *step);
+                 plr_process_step *step);
 
     /* The last reading, `age` seconds after its time, or what is assumed in its place. */
     void (*hold)(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]);
@@ -85,7 +85,7 @@ bool plr_step_is_possible(plr_real way2, plr_real turn2);
  * integral of the whole is right: of a short rest it is no rate of the body any more. Else frames or
  * other sensors have corrected meanwhile what the older reading did. */
 void plr_mean_reading(const plr_filter *f, uint8_t timing, bool makes_up, plr_time_ns t_ns,
-                      const plr_real reading[PLR_READING_DIM], plr_step *step);
+                      const plr_real reading[PLR_READING_DIM], plr_process_step *step);
 
 extern const plr_process plr_process_twist;
 extern const plr_process plr_process_imu;

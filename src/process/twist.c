@@ -95,7 +95,7 @@ static bool lost_readings(const plr_filter *f, plr_real h) {
 }
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_step *step) {
+                 plr_process_step *step) {
     const bool makes_up = !lost_readings(f, plr_seconds(t_ns - f->reading_ns));
     plr_mean_reading(f, f->config.twist_timing, makes_up, t_ns, reading, step);
 }
@@ -143,7 +143,7 @@ static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
 
 /* What the older reading had wrong in the part of the interval that it bridged counts by as much as the
  * reading does beside the velocities that are held: T of plr_velocity_fuse. */
-static void make_up(const plr_step *by, const plr_real T[PLR_POSE_SQUARE],
+static void make_up(const plr_process_step *by, const plr_real T[PLR_POSE_SQUARE],
                     plr_real xi[PLR_POSE_DIM]) {
     for (unsigned j = 0; j < PLR_POSE_DIM; j++) {
         const plr_real wrong = by->seconds * (by->mean[j] - by->whole[j]);
@@ -152,7 +152,7 @@ static void make_up(const plr_step *by, const plr_real T[PLR_POSE_SQUARE],
     }
 }
 
-static void step(plr_filter *f, plr_time_ns t_ns, const plr_step *by) {
+static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
     const plr_real seconds = by->seconds;
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
         variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];

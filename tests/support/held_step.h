@@ -10,7 +10,7 @@
 static inline void held_step(const plr_process *process, plr_filter *f, plr_time_ns t_ns,
                              const plr_real reading[PLR_READING_DIM], plr_real seconds,
                              plr_real interval) {
-    plr_step step = {.seconds = seconds, .interval = interval};
+    plr_process_step step = {.seconds = seconds, .interval = interval};
     memcpy(step.mean, reading, sizeof step.mean);
     memcpy(step.whole, reading, sizeof step.whole);
     process->step(f, t_ns, &step);
