@@ -230,9 +230,7 @@ step 'build: gcc' build_preset release "${strict[@]}"
 built=$?
 joined
 [ $built -eq 0 ] && step 'test: gcc' run_ctest build
-if [ $extent != quick ]; then # mostly waiting: its environment and its tests stand beside what follows
-    beside 'ROS 2 node' tools/ros2.sh
-fi
+[ $extent = long ] && beside 'ROS 2 node' tools/ros2.sh # its environment and its tests take five minutes
 step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" --dist worksteal \
     tests/python
 

@@ -22,7 +22,7 @@ from pelorus.distribution import mixed_up
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
-EXTRAS = ("cv2", "PIL", "matplotlib", "rosbags", "pyproj")
+EXTRAS = ("cv2", "PIL", "matplotlib", "rosbags", "pyproj", "pyulog")
 MOST_BYTES = 250e6  # of a plain install
 
 

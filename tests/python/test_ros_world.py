@@ -227,7 +227,11 @@ def test_a_lost_picture_leaves_its_partner_out_however_wide_the_pairing(
         pictures: Any = ros_frames.read(bag, cameras, calibrated, remarks)
         shown = [(int(left[0, 0]), int(right[0, 0]) - 100) for left, right in pictures.read()]
     assert shown == [(k, k) for k in range(40) if k not in lost]
-    assert remarks == ["3 pictures have no partner and are left out"]
+    assert remarks[-1:] == ["3 pictures have no partner and are left out"]
+    assert [remark.startswith("left and right pictures are 9 ms apart") for remark in remarks] == [
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize("packing", ["<u2", ">u2", "png"])

@@ -71,8 +71,9 @@ def spread(t_ns: Times) -> Spread:
     stamp - T + k T / n. The first batch, and one behind a pause, take the usual interval.
     """
     stamps, first, count = np.unique(t_ns, return_index=True, return_counts=True)
-    if len(stamps) < 2:
-        return Spread(t_ns, int(count[0]) if len(count) else 0)
+    usual = int(np.median(count)) if len(count) else 0
+    if len(stamps) < 2 or usual < 2:  # a stamp that stands twice by mistake makes no batches
+        return Spread(t_ns, usual)
     gaps = np.diff(stamps).astype(np.float64)
     usual_ns = float(np.median(gaps / count[1:]))  # of a reading
     since = np.concatenate(([np.inf], gaps))
@@ -80,4 +81,4 @@ def spread(t_ns: Times) -> Spread:
     batch = np.repeat(np.arange(len(stamps)), count)
     k = np.arange(len(t_ns)) - first[batch] + 1
     early_ns = since[batch] * (1 - k / count[batch])
-    return Spread(t_ns - np.round(early_ns).astype(np.int64), int(np.median(count)))
+    return Spread(t_ns - np.round(early_ns).astype(np.int64), usual)

@@ -194,8 +194,13 @@ class Run:
 
 
 def verdict_of_log(messages: Sequence[Message]) -> Verdict:
-    """Of a filter's result with the recording in it."""
-    return verdict_of(Run.of(messages), known_of(messages))
+    """Of a filter's result with the recording in it, whatever numbers stand in that."""
+    with np.errstate(all="ignore"):
+        run = Run.of(messages)
+        try:
+            return verdict_of(run, known_of(messages))
+        except np.linalg.LinAlgError:  # nothing can be fitted to the recording: the run alone
+            return verdict_of(run, Known())
 
 
 def verdict_of(run: Run | None, known: Known) -> Verdict:
