@@ -35,12 +35,12 @@ STORE = (
     r"|flush|append_state"
 )
 SESSION = (
-    r"(apply|use|delay)_step|apply_until|predict|update|use_frame|use_held|answer|use_in_order"
-    r"|plr_(data|steps)_\w+"
+    r"use_(step|frame|reading|until|kind_until|ready)|update_by|predict|update|answer|take|wait"
+    r"|plr_(use|events|queue)\w*|refuse_step|report_(fault|divergence)"
 )
 HANDLERS = (
     r"plr_start_(begin|change_settings|add_landmark)",
-    r"plr_(data|steps)_use_\w+",
+    r"plr_events_take_\w+",
     r"plr_saving_restore",
     r"save|compare_counts",
 )
