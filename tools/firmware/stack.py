@@ -36,7 +36,7 @@ STORE = (
 )
 SESSION = (
     r"use_(step|frame|reading|until|kind_until|ready)|update_by|predict|update|answer|take|wait"
-    r"|plr_(use|events|queue)\w*|refuse_step|report_(fault|divergence)"
+    r"|plr_(use|events|queue|clock)\w*|refuse_step|report_(fault|divergence)"
 )
 HANDLERS = (
     r"plr_start_(begin|change_settings|add_landmark)",
@@ -46,7 +46,7 @@ HANDLERS = (
 )
 FILTER = (
     r"plr_(filter|predict|correct|consistency|gate|motion|slots|births|match|landmarks|relocate)\w*"
-    r"|process|add_missed|finish_motion|gate_each|append_new|take_up|begin_at"
+    r"|process|take_step|add_missed|finish_motion|gate_each|append_new|take_up|begin_at"
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"(gain|position|id)_before",)),
