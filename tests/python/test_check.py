@@ -141,9 +141,8 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
     found = json.loads(said.out)
     settings = found["settings"]
     assert float(settings["pixel-sigma"]) == pytest.approx(0.8, rel=0.2)
-    # a least value: what the readings scatter by counts, whatever less is told
-    assert float(settings["gyro-noise"]) <= 0.002 * 1.2
-    assert float(settings["accel-noise"]) <= 0.1 * 1.2
+    assert float(settings["gyro-noise"]) == pytest.approx(0.002, rel=0.2)
+    assert float(settings["accel-noise"]) == pytest.approx(0.1, rel=0.2)
     assert found["camera_offset_s"] == pytest.approx(0.02, rel=0.1)
     assert settings["camera-offset"] == f"{found['camera_offset_s']:.4g}"
     texts = [remark["text"] for remark in found["remarks"]]

@@ -157,6 +157,18 @@ def _found(stretch: Inertial) -> Still:
     )
 
 
+def scatter(readings: Inertial) -> tuple[float, float]:
+    """Returns the densities of gyro and accelerometer by which readings scatter about the line
+    through their neighbours: the least that the filter takes for noise (docs/MATH.md 19).
+    """
+    usual_s = float(np.median(np.diff(readings.t_ns))) * 1e-9
+    accel, gyro = (
+        float(np.sqrt(np.mean(np.diff(part, 2, axis=0) ** 2) / 6 * usual_s))
+        for part in _parts(readings)
+    )
+    return gyro, accel
+
+
 def _density(stretch: Inertial, numbers: Floats) -> float:
     """From means of MEAN_S: neighbours differ by density sqrt(2 / MEAN_S)."""
     piece = ((stretch.t_ns - stretch.t_ns[0]) * 1e-9 / MEAN_S).astype(np.int64)

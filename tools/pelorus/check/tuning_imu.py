@@ -32,6 +32,7 @@ from pelorus.check.parameters import (
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
 from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
+from pelorus.inertial_survey import scatter
 
 LOOSE = 10.0  # times the noises, while the clock is far off
 MIDDLE = (2.0, 2.0, 1.5)  # the whole drive with few landmarks, once the clock is about right
@@ -39,8 +40,6 @@ FINE = (1.5, 1.2)
 WALK_STEPS = (4.0, 2.0)
 TOLD = 9.0  # 3 sigma, to either side
 TOLD_FACTOR = 3.0
-FLOOR = 2.0  # the filter takes a noise below half of what the readings scatter as that half
-TOLD_ABOVE_FLOOR = TOLD * (np.log(FLOOR) / np.log(TOLD_FACTOR)) ** 2  # as far by the same parabola
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
@@ -63,7 +62,7 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     side, words = _clock(side | written(values, IMU), offset, given)
     said.append(words)
     side, words = _walks(bench, side, walks)
-    found = search_noises(bench, side, values, IMU, FINE)
+    found = _at_least_scatter(bench, side, search_noises(bench, side, values, IMU, FINE))
     said.append(words)
     found, words = noises(bench, side, found, start)
     said.append(words)
@@ -169,20 +168,36 @@ def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[di
 # --- what a drive does not tell -------------------------------------------------------------------
 
 
+def _scatter(bench: Bench) -> dict[str, float]:
+    """By the names of IMU; below it the filter's noise, and so the likelihood, stays as it is."""
+    gyro, accel = scatter(bench.examined.inertial)
+    return {"gyro": gyro, "accel": accel}
+
+
+def _at_least_scatter(bench: Bench, side: Settings, found: Found) -> Found:
+    """Of noises among which the filter makes no difference, the one that it takes."""
+    least = _scatter(bench)
+    values = {name: max(value, least.get(name, 0.0)) for name, value in found.values.items()}
+    if values == found.values:
+        return found
+    return Found(values, bench.run({**side, **written(values, IMU)}))
+
+
 def _untold(
     bench: Bench, side: Settings, found: Found, parameters: Mapping[str, Parameter]
 ) -> list[str]:
     """The settings of which much more or much less would be about as likely."""
     out = []
+    scattered = _scatter(bench) if parameters is IMU else {}
     for name, parameter in parameters.items():
         value, most, least = found.values[name], parameter.most, parameter.least
-        less, told = (FLOOR, TOLD_ABOVE_FLOOR) if parameters is IMU else (TOLD_FACTOR, TOLD)
-        sides = [min(value * TOLD_FACTOR, most), max(value / less, least)]
+        sides = [min(value * TOLD_FACTOR, most), max(value / TOLD_FACTOR, least)]
         tried = [{**side, **written({**found.values, name: v}, parameters)} for v in sides]
         above, below = (
             found.outcome.gain_over(one) for one in bench.run_all(tried, "what is told")
         )
-        if above <= TOLD or below <= told:
+        by_readings = value / TOLD_FACTOR < scattered.get(name, 0.0)
+        if above <= TOLD or (below <= TOLD and not by_readings):
             out.append(parameter.setting)
     return out
 
