@@ -232,7 +232,7 @@ def test_every_parameter_has_a_description_and_a_default_that_is_possible() -> N
     [
         ("motion", "imus", "one of 'imu', 'gyro_accel', 'wheels' is possible"),
         ("T_cam_imu", [1.0] * 12, "12 numbers; 16 are expected"),
-        ("settings", ["pixel-sgma=1"], "no setting pixel-sgma"),
+        ("settings", ["pixel-sgma=1"], "no setting pixel-sgma: is pixel-sigma "),
         ("settings", ["pixel-sigma"], "name=value is expected"),
         ("settings", ["pixel-sigma=1e9"], "0.001 to 1000 px are possible"),
         ("log", "/no/such/drive.plr", "there is no such folder"),
