@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Flips single bits in filters in the middle of their lives, each in a copy of its own, and counts
  * what came of it. docs/TESTING.md, "The campaign". */
-#include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +8,7 @@
 
 #include "campaign/flip.h"
 #include "campaign/pool.h"
+#include "campaign/whole_number.h"
 #include "pelorus/pelorus.h"
 
 enum { SHORT_FLIPS = 2000, FLIPS = 20000, LONG_FLIPS = 200000 };
@@ -39,10 +39,8 @@ static void refuse(const char *option) {
 }
 
 static unsigned long number(const char *option, const char *text) {
-    char *end = NULL;
-    errno = 0;
-    const unsigned long n = text ? strtoul(text, &end, 10) : 0;
-    if (!text || end == text || *end || errno || text[0] == '-' || n == 0 || n > 100000000)
+    const unsigned long n = whole_number(text, 100000000);
+    if (n == 0)
         refuse(option);
     return n;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* The campaign: many seeded drives of the filter through a simulated world, and what they come to
  * beside the limits that the project sets itself. docs/TESTING.md, "The campaign". */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +8,7 @@
 #include "campaign/pool.h"
 #include "campaign/scenario.h"
 #include "campaign/table.h"
+#include "campaign/whole_number.h"
 #include "pelorus/pelorus.h"
 
 typedef struct options {
@@ -52,10 +52,8 @@ static void refuse(const char *option, const char *value) {
 }
 
 static unsigned long number(const char *option, const char *text) {
-    char *end = NULL;
-    errno = 0;
-    const unsigned long n = text ? strtoul(text, &end, 10) : 0;
-    if (!text || end == text || *end || errno || text[0] == '-' || n == 0 || n > 100000000)
+    const unsigned long n = whole_number(text, 100000000);
+    if (n == 0)
         refuse(option, text);
     return n;
 }

@@ -2,7 +2,6 @@
 /* The swarm: many seeded IMU drives with blows, in this precision and, with --beside, in the other one.
  * docs/TESTING.md, "The swarm". */
 #define _POSIX_C_SOURCE 200809L /* popen */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,6 +9,7 @@
 
 #include "campaign/pool.h"
 #include "campaign/swarm.h"
+#include "campaign/whole_number.h"
 #include "pelorus/pelorus.h"
 
 enum { DRIVES = 40, LONG_DRIVES = 500 };
@@ -44,10 +44,8 @@ static void refuse(const char *option) {
 }
 
 static unsigned long number(const char *option, const char *text) {
-    char *end = NULL;
-    errno = 0;
-    const unsigned long n = text ? strtoul(text, &end, 10) : 0;
-    if (!text || end == text || *end || errno || text[0] == '-' || n == 0 || n > 1000000)
+    const unsigned long n = whole_number(text, 1000000);
+    if (n == 0)
         refuse(option);
     return n;
 }
