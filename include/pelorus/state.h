@@ -264,20 +264,33 @@ typedef struct plr_learnt {
     plr_real J[PLR_CALIBRATIONS * PLR_CALIBRATIONS], eta[PLR_CALIBRATIONS];
 } plr_learnt;
 
-/* The observation of a landmark, linearised once in a frame and kept until the correction: three
- * rows r = H x + noise (src/sensor/measurement.h). */
-typedef struct plr_kept_rows {
+/* An observation of the frame at hand, and what becomes of it: a row of the frame. */
+typedef struct plr_sighting {
+    const plr_observation *seen; /* the caller's, while the call lasts */
+    uint16_t slot;               /* of its landmark, or PLR_NO_SLOT */
+    uint8_t verdict;             /* plr_gate_result in gate.h */
+    uint8_t used;                /* 1: the correction is to use it */
+} plr_sighting;
+
+/* What a frame shows of a landmark, linearised once and kept until the correction: three rows r = H x +
+ * noise (src/sensor/measurement.h). */
+typedef struct plr_linearised {
     plr_real H[PLR_ROWS * PLR_LANDMARK_DIM]; /* derivative by the landmark */
     plr_real r[PLR_ROWS];
-} plr_kept_rows;
+    plr_real d2; /* the squared distance from its prediction that the gate has judged, in sigmas */
+    plr_real det_S; /* of the prediction's covariance: the larger, the more the observation tells */
+} plr_linearised;
 
-/* Of all observations of a frame. Where they depend on the pose too, in `world`, that derivative
- * stands in plr_noise.Wt: such a model leaves it unused. */
-typedef struct plr_kept_measurements {
-    plr_kept_rows of_slot[PLR_MAX_LANDMARKS];
+/* A frame: its valid observations, ascending by id, no id twice, and no two of one slot. */
+typedef struct plr_sightings {
+    plr_sighting at[PLR_MAX_OBSERVATIONS];
+    /* Of those with a landmark, by its slot. Where the rows depend on the pose too, in `world`, that
+     * derivative stands in plr_noise.Wt: such a model leaves it unused. */
+    plr_linearised of_slot[PLR_MAX_LANDMARKS];
     plr_real R[PLR_ROWS]; /* variances of the noise, which all have in common */
-    uint8_t terms;        /* 2: they depend on the pose too */
-} plr_kept_measurements;
+    uint16_t count;
+    uint8_t terms; /* 2: the rows depend on the pose too */
+} plr_sightings;
 
 /* Workspace of one call; its contents are not used by later calls. */
 typedef struct plr_workspace {
@@ -285,15 +298,10 @@ typedef struct plr_workspace {
      * The kernels read a little further than they use, hence the margins. */
     plr_real Vt[PLR_WORK_ROWS * PLR_MAX_LD + PLR_KERNEL_MARGIN];
     plr_real dx[PLR_MAX_LD];
-    plr_noise noise;                        /* of the motion that this frame applies */
-    plr_learnt learnt;                      /* what this correction says of the calibration */
-    plr_kept_measurements kept;             /* those of `used`, by slot */
-    plr_frame_evidence evidence;            /* of this frame, for the supervisor */
-    plr_real gain[PLR_MAX_LANDMARKS];       /* by slot: det S of an accepted observation */
-    uint8_t verdict[PLR_MAX_LANDMARKS];     /* by slot: plr_gate_result in gate.h */
-    uint16_t order[PLR_MAX_OBSERVATIONS];   /* valid observations of the frame, ascending by id */
-    uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* the slot of order[k], or PLR_NO_SLOT */
-    uint16_t used[PLR_MAX_LANDMARKS];       /* positions k in order that the update uses */
+    plr_noise noise;             /* of the motion that this frame applies */
+    plr_learnt learnt;           /* what this correction says of the calibration */
+    plr_frame_evidence evidence; /* of this frame, for the supervisor */
+    plr_sightings sightings;     /* the frame */
 } plr_workspace;
 
 /* Checksums of the filter's memory, to find out whether something else wrote to it. */
@@ -316,7 +324,6 @@ typedef struct plr_filter {
     plr_real interval_s;    /* between the last two of them */
     uint8_t clock_started, reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
-    uint8_t diverged;
 
     plr_real R_WB[9];
     uint32_t frame_number; /* here no processor needs padding before p_WB; likewise health below */

@@ -98,8 +98,6 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
     const plr_status sound = P_xi ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     plr_real P[PLR_POSE_SQUARE];
     pose_covariance(f, P);
     plr_extrinsics_covariance_out(f, P);
@@ -125,8 +123,6 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     const plr_status sound = P_u ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
     plr_process_of(f)->now(f, u, P);
     plr_sensitivity_add_to_velocity(f, P);
@@ -138,8 +134,6 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     const plr_status sound = b ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged && P_b)
-        return PLR_E_DIVERGED;
     if (P_b) {
         plr_real P[PLR_POSE_SQUARE];
         plr_process_of(f)->bias_covariance(f, P);
@@ -161,7 +155,7 @@ plr_status plr_filter_calibration(const plr_filter *f, plr_calibration_result *r
 }
 
 double plr_filter_trace(const plr_filter *f) {
-    if (plr_guard_check_whole(f) != PLR_OK || f->diverged)
+    if (plr_guard_check_whole(f) != PLR_OK)
         return 0;
     plr_real P[PLR_POSE_SQUARE], P_b[PLR_POSE_SQUARE] = {0};
     double trace = plr_covariance_trace(f);

@@ -14,7 +14,7 @@
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
-#include "state/slots.h"
+#include "state/sightings.h"
 #include "supervise/supervise.h"
 
 /* A hash of an observation's four pixel coordinates. */
@@ -30,13 +30,14 @@ static uint32_t hash_of_pixels(const plr_observation *o) {
     return hash;
 }
 
-void plr_evidence_of_picture(plr_filter *f, const plr_frame *frame, unsigned n) {
+void plr_evidence_of_picture(plr_filter *f, const plr_sightings *sightings) {
     plr_picture_evidence *e = &f->work.evidence.picture;
-    for (unsigned k = 0; k < n; k++) {
-        if (f->work.slot_of[k] == PLR_NO_SLOT)
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_sighting *row = &sightings->at[k];
+        if (!plr_is_matched(row))
             continue;
-        plr_slot *slot = &f->slots[f->work.slot_of[k]];
-        const uint32_t hash = hash_of_pixels(&frame->observations[f->work.order[k]]);
+        plr_slot *slot = plr_slot_of(f, row);
+        const uint32_t hash = hash_of_pixels(row->seen);
         e->matched++;
         e->same += slot->pixel_hash == hash;
         slot->pixel_hash = hash;
@@ -65,10 +66,11 @@ void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
     plr_pose_moved_from(f, by_odometry->R_WB, by_odometry->p_WB, e->moved);
 }
 
-bool plr_evidence_before_map(plr_filter *f, unsigned n, plr_evidence_pose *before) {
+bool plr_evidence_before_map(plr_filter *f, const plr_sightings *sightings,
+                             plr_evidence_pose *before) {
     plr_map_evidence *e = &f->work.evidence.map;
-    for (unsigned k = 0; k < n; k++)
-        e->known += f->work.slot_of[k] != PLR_NO_SLOT && f->slots[f->work.slot_of[k]].known;
+    for (unsigned k = 0; k < sightings->count; k++)
+        e->known += plr_is_of_known(f, &sightings->at[k]);
     if (e->known == 0 || f->config.model != PLR_MODEL_BODY)
         return false;
     plr_evidence_note_pose(f, before);
@@ -98,8 +100,11 @@ static void add_biases(plr_filter *f, plr_bias_evidence *e) {
     }
 }
 
-void plr_evidence_complete(plr_filter *f) {
+void plr_evidence_complete(plr_filter *f, plr_sightings *sightings) {
     plr_frame_evidence *e = &f->work.evidence;
+    for (unsigned k = 0; k < sightings->count; k++)
+        if (plr_gate_rejected(&sightings->at[k]))
+            sightings->at[k].slot = plr_slots_find(f, sightings->at[k].seen->id);
     add_biases(f, &e->bias);
     e->events.miscalibrated = plr_calibration_is_off(f);
     e->has_gate = f->par.gate_d2 > 0 || f->par.gate_residual2 > 0;
@@ -109,9 +114,13 @@ void plr_evidence_complete(plr_filter *f) {
 /* ---------------------------------------------------------------- what is told of it */
 
 static plr_rejection why(const plr_filter *f, unsigned slot) {
+    const plr_sightings *frame = &f->work.sightings;
     if (f->slots[slot].moving)
         return PLR_REJECTED_MOVES;
-    return f->work.verdict[slot] == PLR_GATE_FAR ? PLR_REJECTED_FAR : PLR_REJECTED_BY_GATE;
+    for (unsigned k = 0; k < frame->count; k++)
+        if (frame->at[k].slot == slot && frame->at[k].verdict == PLR_GATE_FAR)
+            return PLR_REJECTED_FAR;
+    return PLR_REJECTED_BY_GATE;
 }
 
 /* Puts a landmark among those of the largest mean2. */

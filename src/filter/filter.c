@@ -172,7 +172,7 @@ plr_status plr_filter_reset(plr_filter *f) {
         return sound;
     f->t_ns = f->reading_ns = 0;
     f->interval_s = 0;
-    f->clock_started = f->reading_valid = f->diverged = 0;
+    f->clock_started = f->reading_valid = 0;
     memset(f->reading, 0, sizeof f->reading);
     memset(f->bias, 0, sizeof f->bias);
     memset(f->p_WB, 0, sizeof f->p_WB);
@@ -274,7 +274,6 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
         plr_alignment_keep_world(f);
     plr_supervise_pose_set(&f->supervisor);
     plr_filter_store_for_recovery(f);
-    f->diverged = 0;
     f->frames_off_the_map = 0;
     if (!plr_covariance_is_positive(f)) /* the biases are lost too */
         plr_filter_begin_prior_bias(f, 0);

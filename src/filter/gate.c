@@ -36,7 +36,7 @@ plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
     memcpy(e, m->r, sizeof e);
     plr_solve3_transposed(1, S, e);
     verdict.d2 = plr_dot3(e, e) + m->extra_d2;
-    verdict.gain = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
+    verdict.det_S = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
     verdict.accepted = plr_gate_accepts(f, verdict.d2, m->residual2);
     return verdict;
 }

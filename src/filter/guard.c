@@ -110,8 +110,7 @@ static bool is_in_range(const plr_filter *f) {
            c->known_map <= 1 && c->scene <= PLR_SCENE_MAY_MOVE &&
            c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
            c->slots <= PLR_MAX_LANDMARKS && f->count <= c->slots && f->clock_started <= 1 &&
-           f->reading_valid <= 1 && f->diverged <= 1 && f->motion.pending <= 1 &&
-           f->motion.noisy <= 1;
+           f->reading_valid <= 1 && f->motion.pending <= 1 && f->motion.noisy <= 1;
 }
 
 bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]) {

@@ -159,11 +159,11 @@ static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_o
     return again;
 }
 
-void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
+void plr_filter_watch_start(plr_filter *f, const plr_sightings *sightings) {
     unsigned seen = 0, moved = 0;
     const bool early = plr_alignment_is_early(&f->either.alignment, f->t_ns);
-    for (unsigned k = 0; k < n; k++) {
-        const plr_observation *o = &frame->observations[f->work.order[k]];
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_observation *o = sightings->at[k].seen;
         plr_watched_point *point = watched(&f->either.alignment, o->id);
         if (!point)
             continue;

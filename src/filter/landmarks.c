@@ -18,8 +18,6 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
         return sound;
     if (slot >= f->count)
         return PLR_E_ARGUMENT;
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     plr_landmark found;
     if (!plr_slots_export(f, slot, &found))
         return PLR_E_DIVERGED;
@@ -38,8 +36,6 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
         return PLR_E_RANGE;
     if (!plr_is_place(landmark->p_W_m, landmark->P_W_m2))
         return PLR_E_ARGUMENT;
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     if (!plr_process_has_started(f)) /* the start turns the pose, by which it comes in */
         return PLR_E_NOT_READY;
     if (plr_slots_find(f, landmark->id) != PLR_NO_SLOT)
@@ -61,8 +57,6 @@ plr_status plr_filter_flush_map(plr_filter *f) {
         return sound;
     if (!f->map.sink)
         return PLR_E_MODE;
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     for (unsigned slot = f->count; slot-- > 0;) { /* backwards: removing moves the last */
         plr_landmark landmark;
         if (!plr_slots_export(f, slot, &landmark) || f->map.sink(f->map.context, &landmark) == 0)

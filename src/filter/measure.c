@@ -123,14 +123,14 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     return accepted;
 }
 
-/* Corrects the state by measurements that were accepted. */
-static bool correct(plr_filter *f, const plr_measurement *m, unsigned count) {
-    if (!f->diverged)
-        (void)plr_correct(f, 0, m, count);
-    if (!f->diverged)
-        return true;
-    plr_filter_recover(f);
-    return false;
+/* The pending motion has been applied, with this status: corrects the state by measurements that were
+ * accepted. False if the filter had to recover. */
+static bool correct(plr_filter *f, plr_status status, const plr_measurement *m, unsigned count) {
+    if (status == PLR_OK)
+        status = plr_correct(f, NULL, m, count).status;
+    if (status != PLR_OK)
+        plr_filter_recover(f);
+    return status == PLR_OK;
 }
 
 /* Where velocity is estimated, a reading of the twist is one of the state: gates it, and applies
@@ -142,9 +142,9 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     bool accepted = true;
     const unsigned parts = kind->of_twist(reading, rows);
     plr_filter_note_motion(f);
-    plr_predict_apply_pending(f);
+    const plr_status status = plr_predict_apply_pending(f);
     memset(m, 0, sizeof m);
-    for (unsigned part = 0; part < parts && !f->diverged; part++) {
+    for (unsigned part = 0; part < parts && status == PLR_OK; part++) {
         plr_process_of(f)->measure(f, &rows[part], &m[part].H, m[part].r, m[part].R);
         const plr_verdict verdict = plr_gate_judge(f, &m[part]);
         result->d2 += (double)verdict.d2;
@@ -152,7 +152,7 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     }
     if (reading->sensor == PLR_SENSOR_STANDSTILL)
         f->inertial.still_ns = f->t_ns;
-    return correct(f, m, accepted ? parts : 0) && accepted;
+    return correct(f, status, m, accepted ? parts : 0) && accepted;
 }
 
 /* The place is p + R (rho + theta x rho / 2 + ...), and H has the first order alone. Where the other axes
@@ -211,8 +211,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     if (!passes(f, d2) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
     plr_filter_note_motion(f);
-    plr_predict_apply_pending(f);
-    return correct(f, &m, 1);
+    return correct(f, plr_predict_apply_pending(f), &m, 1);
 }
 
 static void count(plr_filter *f, const plr_reading_result *result) {

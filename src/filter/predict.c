@@ -34,41 +34,38 @@ void plr_predict_drop(plr_filter *f) {
     finish_motion(f);
 }
 
-void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
+plr_status plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
     if (plr_norm2_of_6(applied->z) > 0) {
         plr_real n[PLR_POSE_DIM];
         plr_mat6_vec(n, applied->L, applied->z);
         if (!plr_pose_is_correction(n)) {
             plr_filter_propagate_recovery(f);
             plr_predict_drop(f);
-            plr_filter_diverge(f);
-            return;
+            return plr_filter_diverge(f);
         }
         plr_pose_correct(f, n);
     }
     plr_model_of(f)->propagate(f, applied);
     plr_filter_propagate_recovery(f);
     finish_motion(f);
-    if (!plr_covariance_is_positive(f))
-        plr_filter_diverge(f);
+    return plr_covariance_is_positive(f) ? PLR_OK : plr_filter_diverge(f);
 }
 
-void plr_predict_apply_pending(plr_filter *f) {
+plr_status plr_predict_apply_pending(plr_filter *f) {
     plr_applied_motion applied;
     if (!f->motion.pending)
-        return;
+        return PLR_OK;
     plr_motion_prior(f, 1, &applied);
-    plr_predict_apply(f, &applied);
+    return plr_predict_apply(f, &applied);
 }
 
-void plr_predict_apply_prior(plr_filter *f) {
-    if (!f->motion.pending || f->diverged)
-        return;
-    plr_predict_apply_pending(f);
-    if (!f->work.noise.open)
-        return;
-    plr_covariance_close_noise(f, NULL);
+plr_status plr_predict_apply_prior(plr_filter *f) {
+    plr_status status = plr_predict_apply_pending(f);
+    if (status != PLR_OK || !f->work.noise.open)
+        return status;
+    status = plr_covariance_close_noise(f, NULL);
     (void)plr_model_of(f)->retract(f, f->work.dx); /* restores plr_slot.beyond */
+    return status;
 }
 
 /* The argument `interval` of a process's step. That of twists adds the variance

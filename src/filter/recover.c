@@ -103,7 +103,6 @@ void plr_filter_recover(plr_filter *f) {
     plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P);
     if (plr_sensitivity_is_finite(f))
         plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P);
-    f->diverged = 0;
     f->totals.recoveries++;
     plr_filter_begin_anew(f, P, false);
     plr_calibration_doubt(f);

@@ -165,7 +165,7 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
     const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged || !plr_covariance_is_positive(f))
+    if (!plr_covariance_is_positive(f))
         return PLR_E_DIVERGED;
     plr_state_out out = {.sink = sink, .context = context};
     plr_codec c = {.direction = sink ? PLR_CODEC_WRITE : PLR_CODEC_CHECK,
@@ -286,7 +286,6 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     PASS(c, f, filter);
     if (f) {
         f->count = count.landmarks;
-        f->diverged = 0;
         plr_velocity_forget(f); /* their clock is not the one that goes on */
         memset(f->slots, 0, sizeof f->slots);
         plr_supervise_restored(&f->supervisor);

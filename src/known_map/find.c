@@ -13,23 +13,22 @@
 #include "state/motion.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
-#include "state/slots.h"
+#include "state/sightings.h"
 
 /* So many landmarks fit into work.Vt. */
 #define ROOM (sizeof(((plr_workspace *)0)->Vt) / (sizeof(plr_seen_known)))
 
 /* The known landmarks of the frame, or those that have just come in; those with the lowest ids
  * first. `origin`: where the first one lies, m. Returns how many. */
-static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
-                        bool new_ones_alone, plr_seen_known *seen, double origin[3]) {
+static unsigned collect(const plr_filter *f, const plr_sightings *sightings, bool new_ones_alone,
+                        plr_seen_known *seen, double origin[3]) {
     unsigned count = 0;
-    for (unsigned k = 0; k < n && count < PLR_PLACING_MOST && count < ROOM; k++) {
-        const plr_observation *o = &frame->observations[f->work.order[k]];
-        const uint16_t slot = f->work.slot_of[k];
+    for (unsigned k = 0; k < sightings->count && count < PLR_PLACING_MOST && count < ROOM; k++) {
+        const plr_sighting *s = &sightings->at[k];
         plr_landmark known;
-        if (new_ones_alone && (slot == PLR_NO_SLOT || !plr_has_just_come_in(f, slot)))
+        if (new_ones_alone && !(plr_is_matched(s) && plr_has_just_come_in(f, s->slot)))
             continue;
-        if (!plr_map_ask(f, o->id, &known))
+        if (!plr_map_ask(f, s->seen->id, &known))
             continue;
         if (count == 0)
             memcpy(origin, known.p_W_m, sizeof known.p_W_m);
@@ -37,8 +36,8 @@ static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
             seen[count].w[i] = (plr_real)(known.p_W_m[i] - origin[i]);
         for (unsigned i = 0; i < 9; i++)
             seen[count].P[i] = (plr_real)known.P_W_m2[i];
-        plr_stereo_rows(seen[count].z, o);
-        seen[count].gap_d2 = plr_stereo_row_gap_d2(f, o);
+        plr_stereo_rows(seen[count].z, s->seen);
+        seen[count].gap_d2 = plr_stereo_row_gap_d2(f, s->seen);
         seen[count++].k = (uint16_t)k;
     }
     return count;
@@ -72,11 +71,11 @@ static void set_found(const plr_filter *f, const plr_placing *at, const double o
     plr_sandwich6(found->P_xi, A, at->P_C);
 }
 
-bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+bool plr_find_pose(plr_filter *f, const plr_sightings *sightings, bool guesses,
                    plr_found_pose *found) {
     double origin[3];
     plr_placing guess, at;
-    found->count = collect(f, frame, n, false, plr_seen_known_of(f), origin);
+    found->count = collect(f, sightings, false, plr_seen_known_of(f), origin);
     if (found->count < PLR_PLACING_LEAST)
         return false;
     if (guesses)
@@ -89,12 +88,11 @@ bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guess
     return true;
 }
 
-bool plr_find_likeliest_pose(plr_filter *f, const plr_frame *frame, unsigned n,
-                             plr_found_pose *found) {
+bool plr_find_likeliest_pose(plr_filter *f, const plr_sightings *sightings, plr_found_pose *found) {
     double origin[3];
     plr_real P[PLR_POSE_SQUARE], A[PLR_POSE_SQUARE], R_CB[9], t_CB[3];
     plr_placing prior, at;
-    found->count = collect(f, frame, n, true, plr_seen_known_of(f), origin);
+    found->count = collect(f, sightings, true, plr_seen_known_of(f), origin);
     if (found->count == 0)
         return false;
     guess_placing(f, origin, &prior);

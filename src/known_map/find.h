@@ -35,13 +35,12 @@ static inline plr_seen_known *plr_seen_known_of(plr_filter *f) {
 }
 
 /* By the frame alone; `guesses`: from the present pose. False if fewer than three fifths agree. */
-bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+bool plr_find_pose(plr_filter *f, const plr_sightings *sightings, bool guesses,
                    plr_found_pose *found);
 
 /* By the landmarks that have just come in, and by what is known of the pose. False if there are none, or if
  * fewer than three fifths agree. found->P_xi is zero. */
-bool plr_find_likeliest_pose(plr_filter *f, const plr_frame *frame, unsigned n,
-                             plr_found_pose *found);
+bool plr_find_likeliest_pose(plr_filter *f, const plr_sightings *sightings, plr_found_pose *found);
 
 /* Holds a pose that was found against the predicted one. False if P + P_found cannot be factorised. */
 bool plr_find_gap(const plr_filter *f, const plr_found_pose *found, plr_pose_gap *gap);

@@ -20,7 +20,7 @@ typedef struct plr_seen_known {
     plr_real P[9];   /* its covariance, m^2 */
     plr_real z[3];   /* seen: uL, uR, v, px */
     plr_real gap_d2; /* of vL and vR, which no pose explains */
-    uint16_t k;      /* of work.order */
+    uint16_t k;      /* row of the frame */
     bool agrees;     /* with the pose at hand */
 } plr_seen_known;
 

@@ -10,13 +10,15 @@
 enum { BY_POSE = PLR_ROWS * PLR_POSE_DIM }; /* elements of a derivative by the pose */
 
 void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m) {
-    plr_kept_measurements *kept = &f->work.kept;
+    plr_sightings *frame = &f->work.sightings;
+    plr_linearised *kept = &frame->of_slot[slot];
     const plr_term *own = &m->H.term[0], *pose = &m->H.term[1];
     PLR_ASSERT(own->row == plr_covariance_row(f, slot) && own->columns == PLR_LANDMARK_DIM);
-    memcpy(kept->of_slot[slot].H, own->H, sizeof kept->of_slot[slot].H);
-    memcpy(kept->of_slot[slot].r, m->r, sizeof kept->of_slot[slot].r);
-    memcpy(kept->R, m->R, sizeof kept->R);
-    kept->terms = (uint8_t)m->H.terms;
+    PLR_ASSERT(slot < f->count);
+    memcpy(kept->H, own->H, sizeof kept->H);
+    memcpy(kept->r, m->r, sizeof kept->r);
+    memcpy(frame->R, m->R, sizeof frame->R);
+    frame->terms = (uint8_t)m->H.terms;
     if (m->H.terms == 1)
         return;
     PLR_ASSERT(pose->row == plr_row_of(f, PLR_BLOCK_POSE) && pose->columns == PLR_POSE_DIM);
@@ -25,14 +27,16 @@ void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m
 }
 
 void plr_measurement_recall(const plr_filter *f, unsigned slot, plr_measurement *m) {
-    const plr_kept_measurements *kept = &f->work.kept;
+    const plr_sightings *frame = &f->work.sightings;
+    const plr_linearised *kept = &frame->of_slot[slot];
+    PLR_ASSERT(slot < f->count);
     m->H.terms = 0;
     plr_real *own = plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
-    memcpy(own, kept->of_slot[slot].H, sizeof kept->of_slot[slot].H);
-    memcpy(m->r, kept->of_slot[slot].r, sizeof m->r);
-    memcpy(m->R, kept->R, sizeof m->R);
+    memcpy(own, kept->H, sizeof kept->H);
+    memcpy(m->r, kept->r, sizeof m->r);
+    memcpy(m->R, frame->R, sizeof m->R);
     m->extra_d2 = m->residual2 = m->max_variance = 0;
-    if (kept->terms == 1)
+    if (frame->terms == 1)
         return;
     plr_real *pose = plr_rows_add(&m->H, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM);
     memcpy(pose, f->work.noise.Wt + BY_POSE * slot, BY_POSE * sizeof *pose);

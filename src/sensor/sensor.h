@@ -36,10 +36,9 @@ static inline bool plr_reading_has(const plr_reading *reading, unsigned i) {
     return (reading->axes >> i & 1U) != 0;
 }
 
-/* Looks for a standstill in a frame of n observations (work.order, work.slot_of): true, with the
- * reading, if for a second no pixel moved by more than its noise. */
-bool plr_standstill_is_seen(plr_filter *f, const plr_frame *frame, unsigned n,
-                            plr_reading *reading);
+/* Looks for a standstill in a frame: true, with the reading, if for a second no pixel moved by more than
+ * its noise. */
+bool plr_standstill_is_seen(plr_filter *f, const plr_sightings *sightings, plr_reading *reading);
 
 #define SENSOR(number, kind, about) extern const plr_sensor_kind kind;
 #include "sensor/sensors.def"

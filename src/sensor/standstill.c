@@ -5,7 +5,7 @@
 #include "sensor/sensor.h"
 #include "sensor/stereo.h"
 #include "state/seconds.h"
-#include "state/slots.h"
+#include "state/sightings.h"
 
 enum { MIN_ROWS = 15 }; /* with fewer rows of pixels a standstill is not recognised */
 
@@ -51,15 +51,16 @@ static void anchor(const plr_filter *f, plr_slot *slot, const plr_real z[PLR_ROW
 /* Compares the pixels of the landmarks with their anchors, and anchors those that have none.
  * Returns whether together they have not moved; *old_rows receives the rows with an anchor of a
  * second ago and more, which alone show that a slow body stands. */
-static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned *old_rows) {
+static bool is_still(plr_filter *f, const plr_sightings *sightings, unsigned *old_rows) {
     plr_real distance2 = 0;
     *old_rows = 0;
-    for (unsigned k = 0; k < n; k++) {
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_sighting *s = &sightings->at[k];
         plr_real z[PLR_ROWS];
-        if (f->work.slot_of[k] == PLR_NO_SLOT)
+        if (!plr_is_matched(s))
             continue;
-        plr_slot *slot = &f->slots[f->work.slot_of[k]];
-        plr_stereo_rows(z, &frame->observations[f->work.order[k]]);
+        plr_slot *slot = plr_slot_of(f, s);
+        plr_stereo_rows(z, s->seen);
         if (!slot->anchored) {
             anchor(f, slot, z);
         } else if (f->t_ns - slot->anchor_ns >= STILL_NS) {
@@ -71,12 +72,11 @@ static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned
     return distance2 <= mean + SIGMAS * PLR_SQRT(PLR_R(2) * mean);
 }
 
-bool plr_standstill_is_seen(plr_filter *f, const plr_frame *frame, unsigned n,
-                            plr_reading *reading) {
+bool plr_standstill_is_seen(plr_filter *f, const plr_sightings *sightings, plr_reading *reading) {
     unsigned old_rows;
     if (f->config.standstill_sigma_mps <= 0)
         return false;
-    if (!is_still(f, frame, n, &old_rows)) {
+    if (!is_still(f, sightings, &old_rows)) {
         for (unsigned slot = 0; slot < f->count; slot++)
             f->slots[slot].anchored = 0;
         return false;

@@ -89,8 +89,9 @@ void plr_covariance_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]);
 void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
 
 /* The reverse, after the observations: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T, dx += W
- * Lambda^-1 eta, and nu (6, or NULL) = z + Lambda^-1 eta. Nothing if none was opened. */
-void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
+ * Lambda^-1 eta, and nu (6, or NULL) = z + Lambda^-1 eta. Nothing if none was opened. PLR_E_DIVERGED if
+ * Lambda cannot be factorised. */
+plr_status plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
 
 /* V = C L^-T = P_(:,d) Kt (plr_motion_transpose): three rows' covariance with nu, from `row` on. */
 void plr_covariance_motion_share(const plr_filter *f, unsigned row,

@@ -256,16 +256,14 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
         make_up_for_rounding(f, plr_row_of(f, PLR_BLOCK_VELOCITY), plr_core_dim(f), Vt, ld);
 }
 
-void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
+plr_status plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     const unsigned n = plr_covariance_dim(f), ld = plr_covariance_ld(f);
     plr_noise *noise = &f->work.noise;
     if (!noise->open)
-        return;
+        return PLR_OK;
     noise->open = 0;
-    if (!plr_cholesky_upper(PLR_POSE_DIM, noise->Lambda)) {
-        plr_filter_diverge(f);
-        return;
-    }
+    if (!plr_cholesky_upper(PLR_POSE_DIM, noise->Lambda))
+        return plr_filter_diverge(f);
     plr_real *Xt = noise->Wt, *minus = f->work.Vt;
     plr_solve_upper_transposed(PLR_POSE_DIM, ld, noise->Lambda, Xt, ld);
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta, 1);
@@ -281,6 +279,7 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             nu[k] = noise->z[k] + noise->eta[k];
     }
+    return PLR_OK;
 }
 
 PLR_SELDOM void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],

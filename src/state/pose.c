@@ -81,9 +81,8 @@ void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
         }
 }
 
-void plr_filter_diverge(plr_filter *f) {
-    if (!f->diverged)
-        f->totals.diverged_ns = f->t_ns;
-    f->diverged = 1;
+plr_status plr_filter_diverge(plr_filter *f) {
+    f->totals.diverged_ns = f->t_ns;
     f->work.noise.open = 0; /* W is not added to P any more */
+    return PLR_E_DIVERGED;
 }

@@ -33,7 +33,8 @@ void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]);
 void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
                        plr_real J[PLR_ROWS * PLR_POSE_DIM]);
 
-/* Marks the filter as diverged, because a variance is no longer positive: no update from now on. */
-void plr_filter_diverge(plr_filter *f);
+/* A variance is no longer positive: notes when. Returns PLR_E_DIVERGED, for the caller to pass on until
+ * plr_filter_recover. */
+plr_status plr_filter_diverge(plr_filter *f);
 
 #endif

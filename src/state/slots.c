@@ -69,10 +69,8 @@ void plr_slots_append(plr_filter *f, uint32_t id, bool known, const plr_new_land
 void plr_slots_remove(plr_filter *f, unsigned slot) {
     plr_covariance_remove(f, slot);
     f->count--;
-    if (slot == f->count)
-        return;
-    f->slots[slot] = f->slots[f->count];
-    f->work.verdict[slot] = f->work.verdict[f->count];
+    if (slot < f->count)
+        f->slots[slot] = f->slots[f->count];
 }
 
 bool plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark) {

@@ -7,6 +7,7 @@
 #include <unity.h>
 
 #include "filter/correction.h"
+#include "filter/gate.h"
 #include "sensor/stereo.h"
 #include "state/calibration.h"
 #include "state/covariance.h"
@@ -51,8 +52,9 @@ static void take_specimen(plr_model_kind model, unsigned calibrate) {
         seen[i] = specimen_observation(&filter, i, shift);
         TEST_ASSERT_TRUE(plr_stereo_measure(&filter, i, &seen[i], &m));
         plr_measurement_keep(&filter, i, &m);
-        filter.work.used[i] = filter.work.slot_of[i] = (uint16_t)i;
+        filter.work.sightings.at[i] = (plr_sighting){&seen[i], (uint16_t)i, PLR_GATE_ACCEPTED, 1};
     }
+    filter.work.sightings.count = SEEN;
 }
 
 /* The covariance of (state, errors): [P + S V S^T, S V; V S^T, V], V their variances. */
@@ -112,7 +114,7 @@ static void hold_against_dense(plr_model_kind model, unsigned calibrate) {
         V[(m + 1) * k] = before[k] = (double)filter.par.calibrated.variance[k];
     join(&filter, V, joint);
     dense(joint, dx);
-    TEST_ASSERT_EQUAL_UINT(SEEN, plr_correct(&filter, SEEN, NULL, 0).applied);
+    TEST_ASSERT_EQUAL_UINT(SEEN, plr_correct(&filter, &filter.work.sightings, NULL, 0).applied);
     for (unsigned i = 0; i < n; i++) /* dx stays in the workspace */
         TEST_ASSERT_DOUBLE_WITHIN((1e-9 + 4e4 * eps) * (1 + fabs(dx[i])), dx[i],
                                   (double)filter.work.dx[i]);
@@ -141,7 +143,7 @@ static void test_what_is_considered_widens_what_is_estimated(void) {
     const unsigned m = filter.par.calibrated.count, estimated = filter.par.calibrated.estimated;
     TEST_ASSERT_EQUAL_UINT(4, estimated);
     TEST_ASSERT_EQUAL_UINT(PLR_CALIBRATION_ERRORS, m);
-    (void)plr_correct(&filter, SEEN, NULL, 0);
+    (void)plr_correct(&filter, &filter.work.sightings, NULL, 0);
     wrong_camera_covariance(&filter, V);
     for (unsigned k = estimated; k < m; k++)
         TEST_ASSERT_DOUBLE_WITHIN(1e-6 * V[(m + 1) * k], (double)filter.par.calibrated.variance[k],

@@ -206,8 +206,7 @@ static void test_reset_gives_the_filter_of_the_first_day(void) {
 
 static void test_reset_heals_a_diverged_filter(void) {
     rig_drive(5);
-    rig.filter.diverged = 1;
-    reseal(&rig.filter);
+    spoil_covariance(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&rig.filter));
     setUp();
     rig_drive(5); /* demands PLR_OK of every frame */

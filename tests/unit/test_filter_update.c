@@ -305,7 +305,7 @@ static void test_a_budget_is_kept_and_the_rest_counted(void) {
 }
 
 /* The ones that tell most: those of the largest det(S). */
-static void test_a_budget_takes_the_largest_gains(void) {
+static void test_a_budget_takes_those_of_the_largest_det_S(void) {
     enum { BUDGET = 5 };
     double gain[SCENE_MAX_SEEN], least_used = (double)INFINITY, most_left = 0;
     rig_drive(5);
@@ -317,14 +317,16 @@ static void test_a_budget_takes_the_largest_gains(void) {
         for (unsigned slot = 0; slot < rig.filter.count; slot++)
             if (rig.filter.slots[slot].id == seen[i].id) {
                 const plr_verdict verdict = specimen_judge(&rig.filter, slot, &seen[i]);
-                gain[i] = verdict.accepted ? (double)verdict.gain : 0;
+                gain[i] = verdict.accepted ? (double)verdict.det_S : 0;
             }
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(BUDGET, rig.report.used);
     bool is_used[SCENE_MAX_SEEN] = {false};
-    for (unsigned k = 0; k < BUDGET; k++)
-        is_used[rig.filter.work.order[rig.filter.work.used[k]]] = true;
+    for (unsigned k = 0; k < rig.filter.work.sightings.count; k++) {
+        const plr_sighting *row = &rig.filter.work.sightings.at[k];
+        is_used[row->seen - seen] = row->used;
+    }
     for (unsigned i = 0; i < frame.count; i++) {
         if (is_used[i] && gain[i] < least_used)
             least_used = gain[i];

@@ -178,7 +178,7 @@ static void check_propagate(bool bias) {
         point_of(slot, q[slot]);
     double *P = specimen_covariance(&filter), *Ji = charts(false);
     drive_filter();
-    plr_predict_apply_prior(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
     TEST_ASSERT_EQUAL_UINT(LANDMARKS, filter.count);
 
     double *F = carry_jacobian(q, LANDMARKS), *Jw = charts(true);
@@ -213,7 +213,7 @@ static void test_propagation_moves_the_points_rigidly(void) {
         for (unsigned slot = 0; slot < LANDMARKS; slot++)
             point_of(slot, q[slot]);
         drive_filter();
-        plr_predict_apply_prior(&filter);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
         carry(zero, q, LANDMARKS, after);
         double T_BC[16], CD[16], D_C[16], inverse[16];
         rigid_inverse(T_BC, truth.T_CB);
@@ -249,12 +249,11 @@ static void test_a_landmark_that_the_camera_meets_is_kept_off_it(void) {
     square_multiply(4, CD, T_BC, D_C);
     for (int i = 0; i < 3; i++) /* where the camera will be */
         filter.slots[LANDMARKS - 1].x[i] = (plr_real)D_C[4 * i + 3];
-    plr_predict_apply_prior(&filter);
-    plr_predict_apply_prior(&without);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&without));
     TEST_ASSERT_EQUAL_UINT(LANDMARKS, filter.count);
     point_of(LANDMARKS - 1, q);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]));
-    TEST_ASSERT_EQUAL_UINT8(0, filter.diverged);
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&filter));
     const unsigned n = plr_covariance_dim(&without);
     TEST_ASSERT_TRUE(same_bits(without.P, filter.P, n * (n + 1) / 2));
@@ -465,7 +464,7 @@ static void test_far_points_keep_the_variance_of_their_bearing(void) {
             filter.motion.E[3 * i + j] = (plr_real)(D[4 * i + j] - (i == j));
     }
     filter.motion.pending = 1;
-    plr_predict_apply_prior(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
     TEST_ASSERT_EQUAL_UINT(1, filter.count);
     double *P = specimen_covariance(&filter);
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1, (P[6 * 9 + 6] + P[7 * 9 + 7]) / (2 * bearing));

@@ -187,7 +187,7 @@ static void test_motion_moves_no_landmark_and_no_landmark_block(void) {
     double *P = specimen_covariance(&filter);
     const unsigned n = plr_covariance_dim(&filter);
     specimen_motion(&filter, &chance, &filter.motion);
-    plr_predict_apply_prior(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
     TEST_ASSERT_EQUAL_MEMORY(before, filter.slots, sizeof before);
     double *after = specimen_covariance(&filter);
     for (unsigned i = 12; i < n; i++)
