@@ -75,13 +75,14 @@ void plr_match_slots(plr_filter *f, plr_sightings *sightings) {
         sightings->at[k].verdict = PLR_GATE_NOT_JUDGED;
         sightings->at[k].used = 0;
     }
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        plr_sighting *row = find(sightings, f->slots[slot].id);
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        plr_sighting *row = find(sightings, f->belief.slots[slot].id);
         if (!row)
             continue;
         PLR_ASSERT(!plr_is_matched(row)); /* no two slots have one id */
         row->slot = (uint16_t)slot;
-        f->slots[slot].last_frame = f->frame_number; /* so it is not evicted for another */
+        f->belief.slots[slot].last_frame =
+            f->belief.frame_number; /* so it is not evicted for another */
     }
 }
 
@@ -91,7 +92,7 @@ void plr_match_count(plr_filter *f, const plr_sightings *sightings) {
             continue;
         plr_slot *slot = plr_slot_of(f, &sightings->at[k]);
         slot->times_seen++;
-        slot->last_seen_ns = f->t_ns;
+        slot->last_seen_ns = f->belief.t_ns;
     }
 }
 

@@ -48,7 +48,7 @@ enum {
 /* True if a landmark was out of sight before this frame, and may be lost. */
 static bool is_unseen(const plr_search *s, unsigned i) {
     const plr_slot *slot = plr_search_slot(s, i);
-    return !slot->known && s->f->t_ns - slot->last_seen_ns > UNSEEN_NS;
+    return !slot->known && s->f->belief.t_ns - slot->last_seen_ns > UNSEEN_NS;
 }
 
 /* True if its bearing is too uncertain to linearise at, though the motion were known: the pose drifted
@@ -440,7 +440,7 @@ static void judge_all(plr_search *s, bool found, const plr_real *U, const plr_re
         row->verdict = (uint8_t)(lost ? PLR_GATE_LOST : result);
         own->det_S = at->det_S;
         if (lost) /* as if unseen: the frame does not correct it as it does others */
-            slot->last_frame = f->frame_number - 1;
+            slot->last_frame = f->belief.frame_number - 1;
         if (accepted && !slot->known)
             f->work.noise.range_shift[row->slot] =
                 plr_linearisation_offset(slot, usual, at->range_change, at->range_variance);

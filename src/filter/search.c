@@ -63,10 +63,10 @@ typedef struct plr_camera_step {
 static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_camera_step *step) {
     plr_applied_motion m;
     plr_motion_at(s->f, &s->prior, z, &m);
-    plr_camera_motion(step->E, step->p, &s->f->par.camera, m.E, m.p);
+    plr_camera_motion(step->E, step->p, &s->f->camera.given, m.E, m.p);
     plr_se3_rotation(step->R, step->E);
     memcpy(step->z, z, sizeof step->z);
-    plr_mat6_mul(step->N, s->f->par.Ad_CB, m.JL);
+    plr_mat6_mul(step->N, s->f->camera.Ad_CB, m.JL);
 }
 
 /* Evaluates one observation at a point: U on trial, a and e. False if it cannot be predicted
@@ -136,7 +136,7 @@ static void add_to_sums(const plr_residual *at, plr_search_point *point) {
 
 void plr_search_add(plr_search *s, unsigned row, plr_real active) {
     static const plr_real identity[6] = {1, 0, 0, 1, 0, 1};
-    PLR_ASSERT(s->count < s->f->count && plr_is_matched(&s->sightings->at[row]));
+    PLR_ASSERT(s->count < s->f->belief.count && plr_is_matched(&s->sightings->at[row]));
     plr_residual *at = &s->residuals[s->count++];
     at->row = (uint16_t)row;
     memcpy(at->U[s->current], identity, sizeof at->U[0]);

@@ -127,7 +127,7 @@ static void measure_used(plr_filter *f, const plr_sightings *frame) {
 /* The gate's counts, for the supervisor. */
 static plr_search_decision ask_after_search(plr_filter *f, const plr_sightings *frame,
                                             bool outright) {
-    plr_search_evidence e = {.outright = outright, .now_ns = f->t_ns};
+    plr_search_evidence e = {.outright = outright, .now_ns = f->belief.t_ns};
     for (unsigned k = 0; k < frame->count; k++) {
         e.matched += plr_is_matched(&frame->at[k]);
         e.gated += plr_gate_rejected(&frame->at[k]);
@@ -207,10 +207,10 @@ static plr_status correct(plr_filter *f, plr_sightings *frame, plr_search_decisi
 
 /* Since the last frame the tracks have wandered off their points. */
 static void let_tracks_drift(plr_filter *f) {
-    if (f->supervisor.last_frame_ns == PLR_NEVER_NS || !(f->par.track_drift > 0))
+    if (f->supervisor.last_frame_ns == PLR_NEVER_NS || !(f->camera.track_drift_variance > 0))
         return;
-    const plr_real seconds = plr_seconds(f->t_ns - f->supervisor.last_frame_ns);
-    plr_model_of(f)->drift(f, PLR_SQRT(f->par.track_drift * seconds));
+    const plr_real seconds = plr_seconds(f->belief.t_ns - f->supervisor.last_frame_ns);
+    plr_model_of(f)->drift(f, PLR_SQRT(f->camera.track_drift_variance * seconds));
 }
 
 /* Known landmarks come in, at a pose that is found anew if need be. */
@@ -219,7 +219,7 @@ static plr_status take_up_known(plr_filter *f, plr_sightings *frame, plr_frame_e
     plr_relocation found;
     events->relocated = events->left_out = plr_relocate_when_lost(f, frame, events);
     if (events->relocated) {
-        report->created = (uint16_t)f->count;
+        report->created = (uint16_t)f->belief.count;
         plr_match_slots(f, frame);
         return PLR_OK;
     }
@@ -268,7 +268,7 @@ static plr_status renew_landmarks(plr_filter *f, plr_sightings *frame,
 /* Of a covariance of the pose that part which nothing in the filter measures, where an IMU does measure the tilt:
  * C <- A C A^T, A = I but for the rotation's rows, which keep what is about the vertical u alone. */
 static void keep_position_and_heading(const plr_filter *f, plr_real C[PLR_POSE_SQUARE]) {
-    const plr_real *u = f->R_WB + 6;
+    const plr_real *u = f->belief.R_WB + 6;
     plr_real A[PLR_POSE_SQUARE] = {0}, kept[PLR_POSE_SQUARE];
     for (unsigned i = 0; i < 3; i++) {
         A[(PLR_POSE_DIM + 1) * i] = 1;
@@ -325,7 +325,7 @@ static plr_status estimate(plr_filter *f, plr_sightings *frame, plr_report *repo
     }
     plr_reading still;
     plr_reading_result unused = {0};
-    const bool stands = f->reading_valid && plr_standstill_is_seen(f, frame, &still);
+    const bool stands = f->source.reading_valid && plr_standstill_is_seen(f, frame, &still);
     const bool is_state = plr_process_of(f)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
@@ -354,7 +354,7 @@ static void process(plr_filter *f, const plr_frame *given, plr_report *report) {
 static void wait_for_start(plr_filter *f, const plr_frame *given, plr_report *report) {
     plr_match_in_order(given, &f->work.sightings, report);
     plr_filter_watch_start(f, &f->work.sightings);
-    const plr_readings_evidence now = plr_filter_readings_at(f, f->t_ns);
+    const plr_readings_evidence now = plr_filter_readings_at(f, f->belief.t_ns);
     plr_supervise_waits(&f->supervisor, &now, report);
 }
 
@@ -363,14 +363,15 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
     if (frame->count > PLR_MAX_OBSERVATIONS || (frame->count > 0 && !frame->observations))
         return PLR_E_ARGUMENT;
     if (f->config.mode == PLR_MODE_MAPPING)
-        return f->clock_started && f->t_ns == frame->t_ns ? PLR_OK : PLR_E_MODE;
+        return f->clock_started && f->belief.t_ns == frame->t_ns ? PLR_OK : PLR_E_MODE;
     if (!f->clock_started)
         return PLR_OK;
-    if (frame->t_ns < f->t_ns)
+    if (frame->t_ns < f->belief.t_ns)
         return PLR_E_LATE;
-    if (frame->t_ns - f->t_ns > f->par.max_gap_ns)
+    if (frame->t_ns - f->belief.t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_process_of(f)->check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
+    return plr_process_of(f)->check(f, f->source.reading,
+                                    plr_seconds(frame->t_ns - f->belief.t_ns));
 }
 
 /* A frame of dead reckoning: applies the motion, and the velocities' information about the
@@ -436,11 +437,11 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         f->totals.frames_refused++;
         (void)plr_filter_refuse(f, r->status);
         plr_supervise_refused(&f->supervisor, r);
-        r->active = (uint16_t)f->count;
+        r->active = (uint16_t)f->belief.count;
         return r->status;
     }
     plr_predict_to(f, frame->t_ns);
-    f->frame_number++;
+    f->belief.frame_number++;
     f->totals.frames++;
     memset(&f->work.evidence, 0, sizeof f->work.evidence);
     note_twist(f);
@@ -450,13 +451,13 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         process(f, frame, r);
     } else {
         dead_reckon(f);
-        const plr_readings_evidence now = plr_filter_readings_at(f, f->t_ns);
+        const plr_readings_evidence now = plr_filter_readings_at(f, f->belief.t_ns);
         plr_supervise_dead_reckons(&f->supervisor, &now);
     }
     if (!(f->supervisor.reasons & PLR_REASON_NO_TWISTS) &&
-        f->inertial.fault >= PLR_IMU_FAULT_SATURATED)
-        f->inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
-    r->active = (uint16_t)f->count;
+        f->source.inertial.fault >= PLR_IMU_FAULT_SATURATED)
+        f->source.inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
+    r->active = (uint16_t)f->belief.count;
     count(f, r);
     plr_guard_seal_whole(f);
     return r->status;

@@ -14,7 +14,7 @@ void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m
     plr_linearised *kept = &frame->of_slot[slot];
     const plr_term *own = &m->H.term[0], *pose = &m->H.term[1];
     PLR_ASSERT(own->row == plr_covariance_row(f, slot) && own->columns == PLR_LANDMARK_DIM);
-    PLR_ASSERT(slot < f->count);
+    PLR_ASSERT(slot < f->belief.count);
     memcpy(kept->H, own->H, sizeof kept->H);
     memcpy(kept->r, m->r, sizeof kept->r);
     memcpy(frame->R, m->R, sizeof frame->R);
@@ -29,7 +29,7 @@ void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m
 void plr_measurement_recall(const plr_filter *f, unsigned slot, plr_measurement *m) {
     const plr_sightings *frame = &f->work.sightings;
     const plr_linearised *kept = &frame->of_slot[slot];
-    PLR_ASSERT(slot < f->count);
+    PLR_ASSERT(slot < f->belief.count);
     m->H.terms = 0;
     plr_real *own = plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
     memcpy(own, kept->H, sizeof kept->H);

@@ -17,7 +17,7 @@
 
 /* How many errors are estimated. Where a build has room for none the compiler sees that, and leaves out what
  * estimates them. */
-static inline unsigned plr_calibration_estimated(const plr_calibrated *errors) {
+static inline unsigned plr_calibration_estimated(const plr_error_columns *errors) {
     return PLR_MAX_CALIBRATION > 0 ? errors->estimated : 0U;
 }
 

@@ -16,13 +16,13 @@ static inline bool plr_is_matched(const plr_sighting *s) {
 
 /* The landmark of a matched one. */
 static inline plr_slot *plr_slot_of(plr_filter *f, const plr_sighting *s) {
-    PLR_ASSERT(s->slot < f->count && f->slots[s->slot].id == s->seen->id);
-    return &f->slots[s->slot];
+    PLR_ASSERT(s->slot < f->belief.count && f->belief.slots[s->slot].id == s->seen->id);
+    return &f->belief.slots[s->slot];
 }
 
 /* True if one is matched with a landmark of a given map. */
 static inline bool plr_is_of_known(const plr_filter *f, const plr_sighting *s) {
-    return plr_is_matched(s) && f->slots[s->slot].known;
+    return plr_is_matched(s) && f->belief.slots[s->slot].known;
 }
 
 #endif

@@ -15,8 +15,8 @@ static inline void reseal(plr_filter *f) {
 
 /* Nothing is known any more of pose, velocity and biases: a filter that has diverged. */
 static inline void spoil_covariance(plr_filter *f) {
-    for (unsigned i = 0; i < f->layout.core; i++)
-        f->P[plr_packed_at(i, i)] = (plr_real)NAN;
+    for (unsigned i = 0; i < f->belief.layout.core; i++)
+        f->belief.P[plr_packed_at(i, i)] = (plr_real)NAN;
     reseal(f);
 }
 

@@ -68,7 +68,7 @@ static void test_each_setting_that_differs_makes_it_foreign(void) {
 }
 
 static void test_each_number_of_another_camera_makes_it_foreign(void) {
-    plr_camera *camera = &other.par.camera;
+    plr_camera *camera = &other.camera.given;
     plr_real *const single[] = {&camera->fx, &camera->fy, &camera->cx, &camera->cy,
                                 &camera->baseline};
     plr_real *numbers[17];
@@ -226,17 +226,17 @@ static void test_a_broken_state_is_not_saved(void) {
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_save(&filter, NULL, NULL));
     filter.diverged = 0;
-    filter.P[2] = -1; /* the variance of rho_y */
+    filter.belief.P[2] = -1; /* the variance of rho_y */
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_save(&filter, NULL, NULL));
-    filter.P[2] = 1;
-    filter.P[1] = (plr_real)NAN; /* no variance */
+    filter.belief.P[2] = 1;
+    filter.belief.P[1] = (plr_real)NAN; /* no variance */
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, plr_filter_save(&filter, NULL, NULL));
-    filter.P[1] = 0;
+    filter.belief.P[1] = 0;
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_save(&filter, NULL, NULL));
-    filter.bias[2] = (plr_real)INFINITY;
+    filter.belief.bias[2] = (plr_real)INFINITY;
     reseal(&filter);
     state.length = state.calls = 0;
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, plr_filter_save(&filter, state_bytes_take, &state));
