@@ -15,11 +15,11 @@ bool plr_births_are_allowed(const plr_filter *f) {
 
 /* Initialises a landmark. A slot must be free, and plr_stereo_makes_landmark true. */
 static void append_new(plr_filter *f, const plr_observation *seen) {
-    PLR_ASSERT(f->count < PLR_MAX_LANDMARKS && plr_stereo_makes_landmark(f, seen));
+    PLR_ASSERT(f->belief.count < PLR_MAX_LANDMARKS && plr_stereo_makes_landmark(f, seen));
     plr_new_landmark landmark;
     const plr_real beyond = plr_stereo_initialise(f, seen, &landmark);
     plr_slots_append(f, seen->id, false, &landmark);
-    f->slots[f->count - 1].beyond = beyond;
+    f->belief.slots[f->belief.count - 1].beyond = beyond;
 }
 
 enum { CELLS_ACROSS = 4, CELLS = CELLS_ACROSS * CELLS_ACROSS };
@@ -30,7 +30,7 @@ static unsigned quarter(plr_real x, plr_real centre) {
 }
 
 static unsigned cell_of(const plr_filter *f, const plr_observation *seen) {
-    const plr_camera *camera = &f->par.camera;
+    const plr_camera *camera = &f->camera.given;
     return CELLS_ACROSS * quarter((plr_real)seen->vL_px, camera->cy) +
            quarter((plr_real)seen->uL_px, camera->cx);
 }
@@ -131,7 +131,7 @@ void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
         if (w->slot_of[k] == PLR_NO_SLOT || plr_gate_accepted(f, w->slot_of[k]))
             continue;
         const unsigned slot = plr_slots_find(f, o->id); /* a restart may have moved others */
-        const plr_slot before = f->slots[slot];
+        const plr_slot before = f->belief.slots[slot];
         const bool lost = w->verdict[w->slot_of[k]] == PLR_GATE_LOST;
         if (!lost && !(agrees && plr_track_may_restart(&before)))
             continue;
@@ -143,6 +143,6 @@ void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
         if (!makes)
             continue;
         append_new(f, o);
-        plr_track_restart(&f->slots[f->count - 1], &before);
+        plr_track_restart(&f->belief.slots[f->belief.count - 1], &before);
     }
 }

@@ -19,21 +19,23 @@ void plr_bias_consider(plr_filter *f, bool hold, plr_considered_bias *before) {
     before->considered = hold && may_be_considered(f);
     if (!before->considered)
         return;
-    f->calibration.moves = 0; /* nor is anything learnt of it */
+    f->camera.estimate.moves = 0; /* nor is anything learnt of it */
     before->seconds = f->motion.seconds;
-    memcpy(before->bias, f->bias, sizeof before->bias);
+    memcpy(before->bias, f->belief.bias, sizeof before->bias);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        memcpy(before->S_b[k], f->S[k] + plr_row_of(f, PLR_BLOCK_BIAS), sizeof before->S_b[k]);
+    for (unsigned k = 0; k < f->camera.errors.count; k++)
+        memcpy(before->S_b[k], f->belief.S[k] + plr_row_of(f, PLR_BLOCK_BIAS),
+               sizeof before->S_b[k]);
 }
 
 void plr_bias_restore(plr_filter *f, const plr_considered_bias *before) {
     plr_real lost[PLR_BIAS_DIM * PLR_BIAS_DIM];
     if (!before->considered)
         return;
-    memcpy(f->bias, before->bias, sizeof before->bias);
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        memcpy(f->S[k] + plr_row_of(f, PLR_BLOCK_BIAS), before->S_b[k], sizeof before->S_b[k]);
+    memcpy(f->belief.bias, before->bias, sizeof before->bias);
+    for (unsigned k = 0; k < f->camera.errors.count; k++)
+        memcpy(f->belief.S[k] + plr_row_of(f, PLR_BLOCK_BIAS), before->S_b[k],
+               sizeof before->S_b[k]);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, lost);
     for (unsigned i = 0; i < PLR_BIAS_DIM * PLR_BIAS_DIM; i++)
         lost[i] = before->P_bb[i] - lost[i];

@@ -94,7 +94,7 @@ static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsig
 /* Columns of a batch's E, in whole tiles, those behind the sensitivity's being zero; but a last one that
  * would be alone in its tile stays so. */
 static unsigned whole_tiles(const plr_filter *f) {
-    const plr_calibrated *errors = &f->par.calibrated;
+    const plr_error_columns *errors = &f->camera.errors;
     const unsigned least = plr_calibration_estimated(errors) > 0 ? BESIDE_Y : 0;
     const unsigned columns = (unsigned)OF_S + (errors->count > least ? errors->count : least);
     return columns % TILE == 1 ? columns : (columns + TILE - 1) / TILE * TILE;
@@ -105,13 +105,13 @@ static unsigned whole_tiles(const plr_filter *f) {
 static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, unsigned i,
                               const plr_rows *H, plr_batch *batch, unsigned first) {
     plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS], column[PLR_ROWS];
-    memset(H_s, 0, f->par.calibrated.count * sizeof *H_s);
-    if (i < sensed->seen && f->par.calibrated.count > 0)
+    memset(H_s, 0, f->camera.errors.count * sizeof *H_s);
+    if (i < sensed->seen && f->camera.errors.count > 0)
         plr_stereo_by_calibration(f, f->work.slot_of[f->work.used[i]], H_s);
     for (unsigned k = 0; OF_S + k < whole_tiles(f); k++) {
-        const bool has_column = k < f->par.calibrated.count;
+        const bool has_column = k < f->camera.errors.count;
         if (has_column)
-            plr_rows_apply(H, f->S[k], column);
+            plr_rows_apply(H, f->belief.S[k], column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             batch->E[WIDE * (first + r) + OF_S + k] = has_column ? H_s[k][r] + column[r] : PLR_R(0);
     }
@@ -182,7 +182,7 @@ static void add_noise_information(plr_filter *f, const plr_batch *batch) {
     plr_noise *noise = &f->work.noise;
     add_squares(batch, OF_W, noise->Lambda);
     project(batch, OF_W, OF_DX, noise->eta);
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
+    for (unsigned k = 0; k < f->camera.errors.count; k++)
         project(batch, OF_W, OF_S + k, noise->eta_of_S[k]);
 }
 
@@ -197,7 +197,7 @@ static void add_learnt(plr_filter *f, const plr_batch *batch) {
         for (unsigned l = k; l < BESIDE_Y; l++)
             to->J[PLR_CALIBRATIONS * k + l] += *sum++;
     }
-    for (unsigned k = BESIDE_Y; k < PLR_CALIBRATIONS && k < f->par.calibrated.count; k++) {
+    for (unsigned k = BESIDE_Y; k < PLR_CALIBRATIONS && k < f->camera.errors.count; k++) {
         plr_real less[PLR_POSE_DIM] = {0};
         project(batch, OF_DX, OF_S + k, less);
         to->eta[k] += less[0];
@@ -218,7 +218,7 @@ static void update_estimate(plr_filter *f, const plr_batch *batch) {
         rows[OF_W + k] = w->noise.Wt + k * batch->ld;
     rows[OF_DX] = w->dx;
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
-        rows[OF_S + k] = f->S[k];
+        rows[OF_S + k] = f->belief.S[k];
     for (unsigned k = w->noise.open ? 0 : TILE; k + TILE <= used; k += TILE)
         plr_subtract_four_rows(batch->ld, batch->rows, batch->E + k, WIDE, w->Vt, batch->ld,
                                rows + k);
@@ -244,7 +244,7 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
         return false;
     if (w->noise.open)
         add_noise_information(f, batch);
-    if (plr_calibration_estimated(&f->par.calibrated) > 0)
+    if (plr_calibration_estimated(&f->camera.errors) > 0)
         add_learnt(f, batch);
     update_estimate(f, batch);
     return true;
@@ -292,10 +292,10 @@ static unsigned move_estimate(plr_filter *f, unsigned n) {
     }
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-            f->bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
+            f->belief.bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
     if (plr_has_block(f, PLR_BLOCK_VELOCITY))
         for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
-            f->inertial.velocity[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_VELOCITY) + i];
+            f->belief.velocity[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_VELOCITY) + i];
     plr_velocity_forget_bias(f);
     const unsigned cut = plr_model_of(f)->retract(f, f->work.dx);
     plr_pose_correct(f, f->work.dx);

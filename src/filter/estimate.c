@@ -81,15 +81,15 @@ static void pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE])
 }
 
 plr_time_ns plr_filter_time(const plr_filter *f) {
-    return ready(f) ? f->t_ns : 0;
+    return ready(f) ? f->belief.t_ns : 0;
 }
 
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
     const plr_status sound = T_WB ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    to_double(T_WB->R, f->R_WB, 9);
-    memcpy(T_WB->p, f->p_WB, sizeof T_WB->p);
+    to_double(T_WB->R, f->belief.R_WB, 9);
+    memcpy(T_WB->p, f->belief.p_WB, sizeof T_WB->p);
     plr_extrinsics_pose_out(f, T_WB);
     return PLR_OK;
 }
@@ -149,7 +149,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
         if (status != PLR_OK)
             return status;
     }
-    to_double(b, f->bias, PLR_POSE_DIM);
+    to_double(b, f->belief.bias, PLR_POSE_DIM);
     return PLR_OK;
 }
 

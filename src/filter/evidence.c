@@ -35,7 +35,7 @@ void plr_evidence_of_picture(plr_filter *f, const plr_frame *frame, unsigned n) 
     for (unsigned k = 0; k < n; k++) {
         if (f->work.slot_of[k] == PLR_NO_SLOT)
             continue;
-        plr_slot *slot = &f->slots[f->work.slot_of[k]];
+        plr_slot *slot = &f->belief.slots[f->work.slot_of[k]];
         const uint32_t hash = hash_of_pixels(&frame->observations[f->work.order[k]]);
         e->matched++;
         e->same += slot->pixel_hash == hash;
@@ -45,8 +45,8 @@ void plr_evidence_of_picture(plr_filter *f, const plr_frame *frame, unsigned n) 
 }
 
 void plr_evidence_note_pose(const plr_filter *f, plr_evidence_pose *pose) {
-    memcpy(pose->R_WB, f->R_WB, sizeof pose->R_WB);
-    memcpy(pose->p_WB, f->p_WB, sizeof pose->p_WB);
+    memcpy(pose->R_WB, f->belief.R_WB, sizeof pose->R_WB);
+    memcpy(pose->p_WB, f->belief.p_WB, sizeof pose->p_WB);
 }
 
 void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
@@ -68,7 +68,7 @@ void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
 bool plr_evidence_before_map(plr_filter *f, unsigned n, plr_evidence_pose *before) {
     plr_map_evidence *e = &f->work.evidence.map;
     for (unsigned k = 0; k < n; k++)
-        e->known += f->work.slot_of[k] != PLR_NO_SLOT && f->slots[f->work.slot_of[k]].known;
+        e->known += f->work.slot_of[k] != PLR_NO_SLOT && f->belief.slots[f->work.slot_of[k]].known;
     if (e->known == 0 || f->config.model != PLR_MODEL_BODY)
         return false;
     plr_evidence_note_pose(f, before);
@@ -79,7 +79,7 @@ bool plr_evidence_before_map(plr_filter *f, unsigned n, plr_evidence_pose *befor
 void plr_evidence_after_map(plr_filter *f, const plr_evidence_pose *before) {
     plr_map_evidence *e = &f->work.evidence.map;
     e->adopted = f->work.evidence.events.adopted;
-    memcpy(e->R_WB, f->R_WB, sizeof e->R_WB);
+    memcpy(e->R_WB, f->belief.R_WB, sizeof e->R_WB);
     plr_pose_moved_from(f, before->R_WB, before->p_WB, e->moved);
     plr_motion_pose_covariance(f, e->P_after);
     plr_sensitivity_add_to_pose(f, e->calibration);
@@ -92,7 +92,7 @@ static void add_biases(plr_filter *f, plr_bias_evidence *e) {
         return;
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
-        e->off[k] = f->bias[k] - f->bias_prior[k];
+        e->off[k] = f->belief.bias[k] - f->source.bias_prior[k];
         e->prior[k] = plr_bias_prior_variance(f, k);
         e->variance[k] = P[(PLR_BIAS_DIM + 1) * k];
     }
@@ -103,13 +103,13 @@ void plr_evidence_complete(plr_filter *f) {
     add_biases(f, &e->bias);
     e->events.miscalibrated = plr_calibration_is_off(f);
     e->has_gate = f->par.gate_d2 > 0 || f->par.gate_residual2 > 0;
-    e->readings = plr_filter_readings_at(f, f->t_ns);
+    e->readings = plr_filter_readings_at(f, f->belief.t_ns);
 }
 
 /* ---------------------------------------------------------------- what is told of it */
 
 static plr_rejection why(const plr_filter *f, unsigned slot) {
-    if (f->slots[slot].moving)
+    if (f->belief.slots[slot].moving)
         return PLR_REJECTED_MOVES;
     return f->work.verdict[slot] == PLR_GATE_FAR ? PLR_REJECTED_FAR : PLR_REJECTED_BY_GATE;
 }
@@ -131,10 +131,10 @@ plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *told) {
     if (f->totals.frames == 0)
         return PLR_E_NOT_READY;
     plr_supervise_tell(&f->supervisor, &f->work.evidence, told);
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const plr_slot *s = &f->slots[slot];
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        const plr_slot *s = &f->belief.slots[slot];
         const plr_real variance = s->innovation_variance;
-        if (s->last_frame != f->frame_number || s->rejected == 0)
+        if (s->last_frame != f->belief.frame_number || s->rejected == 0)
             continue;
         insert(told,
                (plr_rejected_landmark){

@@ -51,8 +51,8 @@ void plr_match_slots(plr_filter *f, const plr_observation *seen, unsigned n) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++)
         w->slot_of[k] = PLR_NO_SLOT;
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const uint32_t id = f->slots[slot].id;
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        const uint32_t id = f->belief.slots[slot].id;
         unsigned low = 0, high = n;
         while (low < high) {
             const unsigned middle = (low + high) / 2;
@@ -64,7 +64,8 @@ void plr_match_slots(plr_filter *f, const plr_observation *seen, unsigned n) {
         if (low < n && seen[w->order[low]].id == id) {
             PLR_ASSERT(w->slot_of[low] == PLR_NO_SLOT); /* no two slots have one id */
             w->slot_of[low] = (uint16_t)slot;
-            f->slots[slot].last_frame = f->frame_number; /* so it is not evicted for another */
+            f->belief.slots[slot].last_frame =
+                f->belief.frame_number; /* so it is not evicted for another */
         }
     }
 }
@@ -72,10 +73,10 @@ void plr_match_slots(plr_filter *f, const plr_observation *seen, unsigned n) {
 void plr_match_count(plr_filter *f, unsigned n) {
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
-            PLR_ASSERT(f->work.slot_of[k] < f->count);
-            plr_slot *slot = &f->slots[f->work.slot_of[k]];
+            PLR_ASSERT(f->work.slot_of[k] < f->belief.count);
+            plr_slot *slot = &f->belief.slots[f->work.slot_of[k]];
             slot->times_seen++;
-            slot->last_seen_ns = f->t_ns;
+            slot->last_seen_ns = f->belief.t_ns;
         }
 }
 

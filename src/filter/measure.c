@@ -70,13 +70,14 @@ static plr_status check_time(const plr_filter *f, const plr_reading *reading) {
         return PLR_E_MODE;
     if (!plr_process_has_started(f))
         return PLR_E_NOT_READY;
-    if (!f->clock_started || !f->reading_valid || repeats(f, reading))
+    if (!f->clock_started || !f->source.reading_valid || repeats(f, reading))
         return PLR_E_TIME;
-    if (reading->t_ns < f->t_ns)
+    if (reading->t_ns < f->belief.t_ns)
         return PLR_E_LATE;
-    if (reading->t_ns - f->t_ns > f->par.max_gap_ns)
+    if (reading->t_ns - f->belief.t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_process_of(f)->check(f, f->reading, plr_seconds(reading->t_ns - f->t_ns));
+    return plr_process_of(f)->check(f, f->source.reading,
+                                    plr_seconds(reading->t_ns - f->belief.t_ns));
 }
 
 /* d^2 = r^T (M P M^T + R)^-1 r of three rows M over six numbers of covariance P; negative if that
@@ -151,7 +152,7 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
         accepted = accepted && verdict.accepted;
     }
     if (reading->sensor == PLR_SENSOR_STANDSTILL)
-        f->inertial.still_ns = f->t_ns;
+        f->source.inertial.still_ns = f->belief.t_ns;
     return correct(f, m, accepted ? parts : 0) && accepted;
 }
 
@@ -169,8 +170,8 @@ static plr_real second_order(const plr_filter *f, const plr_reading *reading,
             continue;
         for (unsigned i = 0; i < 3; i++)
             for (unsigned j = 0; j < 3; j++)
-                row[i] = PLR_FMA(P[PLR_POSE_DIM * i + j], f->R_WB[3 * axis + j], row[i]);
-        way += plr_dot3(row, f->R_WB + 3 * axis);
+                row[i] = PLR_FMA(P[PLR_POSE_DIM * i + j], f->belief.R_WB[3 * axis + j], row[i]);
+        way += plr_dot3(row, f->belief.R_WB + 3 * axis);
     }
     return PLR_R(0.25) * way * turn;
 }
@@ -248,7 +249,8 @@ static void supervise(plr_filter *f, const plr_reading *reading, bool used, doub
         numbers += plr_reading_has(reading, i);
     if (reading->sensor == PLR_SENSOR_STANDSTILL) /* three of each of its bits */
         numbers *= 3;
-    plr_supervise_reading(&f->supervisor, reading, numbers, used, (plr_real)d2, bounds, f->t_ns);
+    plr_supervise_reading(&f->supervisor, reading, numbers, used, (plr_real)d2, bounds,
+                          f->belief.t_ns);
 }
 
 static plr_status refuse(plr_filter *f, plr_status status, plr_reading_result *result) {

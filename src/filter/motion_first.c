@@ -48,7 +48,7 @@ enum {
 /* True if a landmark was out of sight before this frame, and may be lost. */
 static bool is_unseen(const plr_search *s, unsigned i) {
     const plr_slot *slot = plr_search_slot(s, i);
-    return !slot->known && s->f->t_ns - slot->last_seen_ns > UNSEEN_NS;
+    return !slot->known && s->f->belief.t_ns - slot->last_seen_ns > UNSEEN_NS;
 }
 
 /* True if its bearing is too uncertain to linearise at, though the motion were known: the pose drifted
@@ -423,7 +423,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     unsigned unknown = 0; /* the others are of a given map, and take no part */
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
-            const bool known = f->slots[f->work.slot_of[k]].known;
+            const bool known = f->belief.slots[f->work.slot_of[k]].known;
             f->work.used[s.count] = (uint16_t)k;
             unknown += !known;
             plr_search_add(&s, known ? 0 : 1);
@@ -449,12 +449,12 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     for (unsigned i = 0; i < s.count; i++) {
         const plr_gate_result result = judge(&s, i, found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
-        const unsigned number = (unsigned)(slot - f->slots);
+        const unsigned number = (unsigned)(slot - f->belief.slots);
         const bool accepted = result == PLR_GATE_ACCEPTED;
         const bool lost = !accepted && has_drifted(&s, i);
         plr_gate_note(f, number, lost ? PLR_GATE_LOST : result, s.sightings[i].gain);
         if (lost) /* as if unseen: the frame does not correct it as it does others */
-            slot->last_frame = f->frame_number - 1;
+            slot->last_frame = f->belief.frame_number - 1;
         if (accepted && !slot->known)
             f->work.noise.range_shift[number] = plr_linearisation_offset(
                 slot, usual, s.sightings[i].range_change, s.sightings[i].range_variance);

@@ -24,7 +24,7 @@
 
 static void finish_motion(plr_filter *f) {
     plr_process_of(f)->walk(f, f->motion.seconds);
-    f->bias_walked_s += (double)f->motion.seconds;
+    f->source.bias_walked_s += (double)f->motion.seconds;
     plr_motion_clear(f);
 }
 
@@ -77,8 +77,8 @@ void plr_predict_apply_prior(plr_filter *f) {
  * seconds: within the interval tau between readings by the usual sigma^2 tau h, and later, if
  * twists fail to come, to sigma^2 h^2. */
 static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
-    const plr_real tau = f->interval_s;
-    if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
+    const plr_real tau = f->source.interval_s;
+    if (!f->source.reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
         return tau > 0 ? tau : h1 - h0;
     return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
 }
@@ -91,7 +91,7 @@ static void take_step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *s
 /* Adds what the last reading misses between h0 and h1 seconds after its time. */
 static void add_missed(plr_filter *f, plr_real h0, plr_real h1, const plr_real *next) {
     plr_real variance[PLR_POSE_DIM];
-    if (!f->reading_valid || !plr_process_of(f)->missed ||
+    if (!f->source.reading_valid || !plr_process_of(f)->missed ||
         !plr_process_of(f)->missed(f, h0, h1, next, variance))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
@@ -99,17 +99,17 @@ static void add_missed(plr_filter *f, plr_real h0, plr_real h1, const plr_real *
 }
 
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
-    if (f->clock_started && t_ns > f->t_ns && plr_process_has_started(f)) {
-        const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
-        const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
-        plr_process_step step = {.seconds = plr_seconds(t_ns - f->t_ns),
+    if (f->clock_started && t_ns > f->belief.t_ns && plr_process_has_started(f)) {
+        const plr_time_ns since = f->source.reading_valid ? f->source.reading_ns : f->belief.t_ns;
+        const plr_real h0 = plr_seconds(f->belief.t_ns - since), h1 = plr_seconds(t_ns - since);
+        plr_process_step step = {.seconds = plr_seconds(t_ns - f->belief.t_ns),
                                  .interval = noise_interval(f, h0, h1)};
         plr_process_of(f)->hold(f, h0, step.mean);
         memcpy(step.whole, step.mean, sizeof step.whole);
         take_step(f, t_ns, &step);
         add_missed(f, h0, h1, NULL);
     }
-    f->t_ns = t_ns;
+    f->belief.t_ns = t_ns;
     f->clock_started = 1;
 }
 
@@ -118,9 +118,9 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
 static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
     if (!f->clock_started)
         return PLR_OK;
-    if ((f->reading_valid && t_ns <= f->reading_ns) || t_ns < f->t_ns)
+    if ((f->source.reading_valid && t_ns <= f->source.reading_ns) || t_ns < f->belief.t_ns)
         return PLR_E_TIME;
-    return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
+    return t_ns - f->belief.t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
 }
 
 /* Checks that the reading can be held for a usual interval. With timing start it is used only when
@@ -129,19 +129,19 @@ static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_
                                 plr_real interval) {
     const plr_real first = PLR_R(1e-3); /* there is no interval yet */
     plr_real seconds = interval > 0 ? interval : first;
-    if (f->interval_s > 0 &&
-        f->interval_s < seconds) /* a longer pause is not expected to be repeated */
-        seconds = f->interval_s;
+    if (f->source.interval_s > 0 &&
+        f->source.interval_s < seconds) /* a longer pause is not expected to be repeated */
+        seconds = f->source.interval_s;
     return plr_process_of(f)->check(f, reading, seconds);
 }
 
 static void store_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
                           plr_real interval) {
     PLR_ASSERT(interval >= 0);
-    memcpy(f->reading, reading, sizeof f->reading);
-    f->reading_ns = t_ns;
-    f->reading_valid = 1;
-    f->interval_s = interval;
+    memcpy(f->source.reading, reading, sizeof f->source.reading);
+    f->source.reading_ns = t_ns;
+    f->source.reading_valid = 1;
+    f->source.interval_s = interval;
     f->totals.twists++;
 }
 
@@ -160,8 +160,9 @@ plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
         return planned;
     plr_process_step *step = &planned.step;
     plr_process_of(f)->mean(f, t_ns, reading, step);
-    step->seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
-    step->interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : step->seconds;
+    step->seconds = f->clock_started ? plr_seconds(t_ns - f->belief.t_ns) : 0;
+    step->interval =
+        f->source.reading_valid ? plr_seconds(t_ns - f->source.reading_ns) : step->seconds;
     if (plr_process_of(f)->check(f, step->mean, step->seconds) != PLR_OK ||
         check_reading(f, reading, step->interval) != PLR_OK)
         planned.status = PLR_E_RANGE;
@@ -182,7 +183,7 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
         take_step(f, t_ns, step);
         add_missed(f, step->interval - step->seconds, step->interval, reading);
     }
-    f->t_ns = t_ns;
+    f->belief.t_ns = t_ns;
     f->clock_started = 1;
     store_reading(f, t_ns, reading, step->interval);
     plr_guard_seal(f);

@@ -36,14 +36,14 @@ void plr_filter_store_for_recovery(plr_filter *f) {
 /* S, drivers x drivers: the covariance of biases and velocity when the filter began, and of theta
  * in P. */
 static void prior_of_drivers(const plr_filter *f, const plr_real P[PLR_POSE_SQUARE], plr_real *S) {
-    const unsigned first = f->layout.driver, drivers = f->layout.drivers;
+    const unsigned first = f->belief.layout.driver, drivers = f->belief.layout.drivers;
     for (unsigned d = 0; d < drivers; d++) {
         const unsigned row = first + d, bias = plr_row_of(f, PLR_BLOCK_BIAS);
         plr_real *own = &S[(drivers + 1) * d];
         if (row >= bias)
             *own = plr_bias_prior_variance(f, row - bias);
         else if (row >= PLR_POSE_DIM)
-            *own = f->par.start_velocity_variance;
+            *own = f->source.start_velocity_variance;
         else
             for (unsigned e = 0; first + e < PLR_POSE_DIM; e++)
                 S[drivers * d + e] = P[PLR_POSE_DIM * row + first + e];
@@ -61,7 +61,7 @@ void plr_filter_propagate_recovery(plr_filter *f) {
     unpack(f, P);
     plr_sandwich6(carried, A, P);
     prior_of_drivers(f, P, S);
-    plr_sandwich_drivers(BSB, f->layout.drivers, m->B, S);
+    plr_sandwich_drivers(BSB, f->belief.layout.drivers, m->B, S);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         carried[i] += m->Q[i] + BSB[i];
     pack(f, carried);
@@ -72,7 +72,7 @@ void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], boo
     pack(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] = (double)P[i];
-    f->count = 0;
+    f->belief.count = 0;
     f->totals.widened++;
     f->frames_off_the_map = 0;
     f->work.noise.open = 0;
@@ -87,9 +87,10 @@ void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas) {
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        const plr_real prior = plr_bias_prior_variance(f, i), off = f->bias[i] - f->bias_prior[i];
+        const plr_real prior = plr_bias_prior_variance(f, i),
+                       off = f->belief.bias[i] - f->source.bias_prior[i];
         if (!(off * off <= sigmas * sigmas * prior))
-            f->bias[i] = f->bias_prior[i];
+            f->belief.bias[i] = f->source.bias_prior[i];
         variance[i] = (double)prior;
     }
     plr_filter_begin_bias(f, variance);

@@ -41,7 +41,7 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
         return;
     for (unsigned k = 0; k < n; k++) {
         const uint16_t slot = f->work.slot_of[k];
-        if (slot == PLR_NO_SLOT || !f->slots[slot].known)
+        if (slot == PLR_NO_SLOT || !f->belief.slots[slot].known)
             continue;
         seen++;
         off += !plr_gate_accepted(f, slot);
@@ -63,7 +63,7 @@ static void take_up(plr_filter *f, const plr_frame *frame, const plr_seen_known 
         const uint32_t id = frame->observations[f->work.order[seen[i].k]].id;
         plr_landmark known;
         plr_new_landmark landmark;
-        if (seen[i].agrees && f->count < f->config.slots && plr_map_ask(f, id, &known) &&
+        if (seen[i].agrees && f->belief.count < f->config.slots && plr_map_ask(f, id, &known) &&
             plr_model_of(f)->adopt(f, &known, &landmark))
             plr_slots_append(f, id, true, &landmark);
     }
@@ -72,8 +72,8 @@ static void take_up(plr_filter *f, const plr_frame *frame, const plr_seen_known 
 static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose *found) {
     const bool again = plr_supervise_was_relocated(&f->supervisor);
     plr_real P[PLR_POSE_SQUARE];
-    memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
-    memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
+    memcpy(f->belief.R_WB, found->R_WB, sizeof f->belief.R_WB);
+    memcpy(f->belief.p_WB, found->p_WB, sizeof f->belief.p_WB);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = WIDER * found->P_xi[i];
     plr_filter_begin_anew(f, P, true);
@@ -111,20 +111,20 @@ static bool is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE],
 
 static bool slot_is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE],
                               unsigned slot) {
-    const plr_slot *s = &f->slots[slot];
+    const plr_slot *s = &f->belief.slots[slot];
     return s->known && is_uncertain(f, C, plr_dot3(s->x, s->x));
 }
 
 /* Known landmarks that the caller has inserted stay: they would not come in again. */
 static bool is_in_map(const plr_filter *f, unsigned slot) {
     plr_landmark known;
-    return f->slots[slot].known && plr_map_ask(f, f->slots[slot].id, &known);
+    return f->belief.slots[slot].known && plr_map_ask(f, f->belief.slots[slot].id, &known);
 }
 
 void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
     if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
         return;
-    for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
+    for (unsigned slot = f->belief.count; slot-- > 0;) /* backwards: removing moves the last */
         if (slot_is_uncertain(f, C, slot) && is_in_map(f, slot))
             plr_slots_remove(f, slot);
 }
@@ -141,7 +141,7 @@ static unsigned count_uncertain(const plr_filter *f, unsigned n, unsigned *new_o
         motion[i] += f->motion.Q[i];
     for (unsigned k = 0; k < n; k++) {
         const uint16_t slot = f->work.slot_of[k];
-        if (slot == PLR_NO_SLOT || !f->slots[slot].known)
+        if (slot == PLR_NO_SLOT || !f->belief.slots[slot].known)
             continue;
         const bool is_new = plr_has_just_come_in(f, slot);
         const bool is = slot_is_uncertain(f, is_new ? P_xi : motion, slot);
@@ -153,7 +153,7 @@ static unsigned count_uncertain(const plr_filter *f, unsigned n, unsigned *new_o
 
 /* They come in again: all known landmarks, or those that have just come in. */
 static void drop_known(plr_filter *f, bool new_ones_alone) {
-    for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
+    for (unsigned slot = f->belief.count; slot-- > 0;) /* backwards: removing moves the last */
         if ((!new_ones_alone || plr_has_just_come_in(f, slot)) && is_in_map(f, slot))
             plr_slots_remove(f, slot);
 }
@@ -175,8 +175,8 @@ static void move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_g
 static void replace_pose(plr_filter *f, const plr_found_pose *found,
                          const plr_real P[PLR_POSE_SQUARE]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
-    memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
-    memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
+    memcpy(f->belief.R_WB, found->R_WB, sizeof f->belief.R_WB);
+    memcpy(f->belief.p_WB, found->p_WB, sizeof f->belief.p_WB);
     plr_covariance_forget(f, PLR_BLOCK_POSE, none);
     plr_covariance_add(f, PLR_BLOCK_POSE, P);
 }

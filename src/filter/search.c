@@ -63,10 +63,10 @@ typedef struct plr_camera_step {
 static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_camera_step *step) {
     plr_applied_motion m;
     plr_motion_at(s->f, &s->prior, z, &m);
-    plr_camera_motion(step->E, step->p, &s->f->par.camera, m.E, m.p);
+    plr_camera_motion(step->E, step->p, &s->f->camera.given, m.E, m.p);
     plr_se3_rotation(step->R, step->E);
     memcpy(step->z, z, sizeof step->z);
-    plr_mat6_mul(step->N, s->f->par.Ad_CB, m.JL);
+    plr_mat6_mul(step->N, s->f->camera.Ad_CB, m.JL);
 }
 
 /* Evaluates one observation at a point: U on trial, a and e. False if it cannot be predicted

@@ -57,7 +57,7 @@ static inline const plr_observation *plr_search_observation(const plr_search *s,
 
 static inline plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
     const plr_workspace *w = &s->f->work;
-    return &s->f->slots[w->slot_of[w->used[i]]];
+    return &s->f->belief.slots[w->slot_of[w->used[i]]];
 }
 
 /* Appends the observation work.used[s->count]. `active` is 1 if it takes part in the search, else

@@ -61,7 +61,7 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
         if (slot == PLR_NO_SLOT)
             continue;
         report->matched++;
-        plr_track_count(&f->slots[slot], (plr_gate_result)w->verdict[slot]);
+        plr_track_count(&f->belief.slots[slot], (plr_gate_result)w->verdict[slot]);
         if (!plr_gate_accepted(f, slot)) {
             report->gated++;
             continue;
@@ -126,7 +126,7 @@ static void measure_used(plr_filter *f, const plr_frame *frame, unsigned used) {
 
 /* The gate's counts, for the supervisor. */
 static plr_search_decision ask_after_search(plr_filter *f, unsigned n, bool outright) {
-    plr_search_evidence e = {.outright = outright, .now_ns = f->t_ns};
+    plr_search_evidence e = {.outright = outright, .now_ns = f->belief.t_ns};
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
             e.matched++;
@@ -185,10 +185,10 @@ static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, uns
 
 /* Since the last frame the tracks have wandered off their points. */
 static void let_tracks_drift(plr_filter *f) {
-    if (f->supervisor.last_frame_ns == PLR_NEVER_NS || !(f->par.track_drift > 0))
+    if (f->supervisor.last_frame_ns == PLR_NEVER_NS || !(f->camera.track_drift_variance > 0))
         return;
-    const plr_real seconds = plr_seconds(f->t_ns - f->supervisor.last_frame_ns);
-    plr_model_of(f)->drift(f, PLR_SQRT(f->par.track_drift * seconds));
+    const plr_real seconds = plr_seconds(f->belief.t_ns - f->supervisor.last_frame_ns);
+    plr_model_of(f)->drift(f, PLR_SQRT(f->camera.track_drift_variance * seconds));
 }
 
 /* Known landmarks come in, at a pose that is found anew if need be. */
@@ -197,7 +197,7 @@ static void take_up_known(plr_filter *f, const plr_frame *frame, unsigned n,
     const plr_observation *seen = frame->observations;
     events->relocated = events->left_out = plr_relocate_when_lost(f, frame, n, events);
     if (events->relocated) {
-        report->created = (uint16_t)f->count;
+        report->created = (uint16_t)f->belief.count;
         plr_match_slots(f, seen, n);
         return;
     }
@@ -259,7 +259,7 @@ static void renew_landmarks(plr_filter *f, const plr_frame *frame, unsigned n,
 /* Of a covariance of the pose that part which nothing in the filter measures, where an IMU does measure the tilt:
  * C <- A C A^T, A = I but for the rotation's rows, which keep what is about the vertical u alone. */
 static void keep_position_and_heading(const plr_filter *f, plr_real C[PLR_POSE_SQUARE]) {
-    const plr_real *u = f->R_WB + 6;
+    const plr_real *u = f->belief.R_WB + 6;
     plr_real A[PLR_POSE_SQUARE] = {0}, kept[PLR_POSE_SQUARE];
     for (unsigned i = 0; i < 3; i++) {
         A[(PLR_POSE_DIM + 1) * i] = 1;
@@ -306,7 +306,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
         n = 0; /* it does not show the present */
     plr_reading still;
     plr_reading_result unused = {0};
-    const bool stands = f->reading_valid && plr_standstill_is_seen(f, frame, n, &still);
+    const bool stands = f->source.reading_valid && plr_standstill_is_seen(f, frame, n, &still);
     const bool is_state = plr_process_of(f)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
@@ -330,7 +330,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
 static void wait_for_start(plr_filter *f, const plr_frame *frame, plr_report *report) {
     const unsigned n = plr_match_in_order(f, frame, report);
     plr_filter_watch_start(f, frame, n);
-    const plr_readings_evidence now = plr_filter_readings_at(f, f->t_ns);
+    const plr_readings_evidence now = plr_filter_readings_at(f, f->belief.t_ns);
     plr_supervise_waits(&f->supervisor, &now, report);
 }
 
@@ -339,14 +339,15 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
     if (frame->count > PLR_MAX_OBSERVATIONS || (frame->count > 0 && !frame->observations))
         return PLR_E_ARGUMENT;
     if (f->config.mode == PLR_MODE_MAPPING)
-        return f->clock_started && f->t_ns == frame->t_ns ? PLR_OK : PLR_E_MODE;
+        return f->clock_started && f->belief.t_ns == frame->t_ns ? PLR_OK : PLR_E_MODE;
     if (!f->clock_started)
         return PLR_OK;
-    if (frame->t_ns < f->t_ns)
+    if (frame->t_ns < f->belief.t_ns)
         return PLR_E_LATE;
-    if (frame->t_ns - f->t_ns > f->par.max_gap_ns)
+    if (frame->t_ns - f->belief.t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_process_of(f)->check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
+    return plr_process_of(f)->check(f, f->source.reading,
+                                    plr_seconds(frame->t_ns - f->belief.t_ns));
 }
 
 /* A frame of dead reckoning: applies the motion, and the velocities' information about the
@@ -411,11 +412,11 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         f->totals.frames_refused++;
         (void)plr_filter_refuse(f, r->status);
         plr_supervise_refused(&f->supervisor, r);
-        r->active = (uint16_t)f->count;
+        r->active = (uint16_t)f->belief.count;
         return r->status;
     }
     plr_predict_to(f, frame->t_ns);
-    f->frame_number++;
+    f->belief.frame_number++;
     f->totals.frames++;
     memset(&f->work.evidence, 0, sizeof f->work.evidence);
     note_twist(f);
@@ -425,13 +426,13 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         process(f, frame, r);
     } else {
         dead_reckon(f);
-        const plr_readings_evidence now = plr_filter_readings_at(f, f->t_ns);
+        const plr_readings_evidence now = plr_filter_readings_at(f, f->belief.t_ns);
         plr_supervise_dead_reckons(&f->supervisor, &now);
     }
     if (!(f->supervisor.reasons & PLR_REASON_NO_TWISTS) &&
-        f->inertial.fault >= PLR_IMU_FAULT_SATURATED)
-        f->inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
-    r->active = (uint16_t)f->count;
+        f->source.inertial.fault >= PLR_IMU_FAULT_SATURATED)
+        f->source.inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
+    r->active = (uint16_t)f->belief.count;
     count(f, r);
     plr_guard_seal_whole(f);
     return r->status;

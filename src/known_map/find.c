@@ -48,9 +48,9 @@ static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
 static void guess_placing(const plr_filter *f, const double origin[3], plr_placing *guess) {
     plr_real offset_W[3], offset_C[3], R_CB[9], t_CB[3];
     for (unsigned i = 0; i < 3; i++)
-        offset_W[i] = (plr_real)(origin[i] - f->p_WB[i]);
+        offset_W[i] = (plr_real)(origin[i] - f->belief.p_WB[i]);
     plr_calibration_place(f, R_CB, t_CB);
-    plr_mat3_mul_nt(guess->R, R_CB, f->R_WB);
+    plr_mat3_mul_nt(guess->R, R_CB, f->belief.R_WB);
     plr_mat3_vec(offset_C, guess->R, offset_W);
     for (unsigned i = 0; i < 3; i++)
         guess->t[i] = offset_C[i] + t_CB[i];

@@ -26,7 +26,7 @@ typedef struct plr_pose_gap {
 #define PLR_TOO_WIDE PLR_R(1e4)
 
 static inline bool plr_has_just_come_in(const plr_filter *f, unsigned slot) {
-    return f->slots[slot].known && f->slots[slot].times_seen == 0;
+    return f->belief.slots[slot].known && f->belief.slots[slot].times_seen == 0;
 }
 
 /* The known landmarks that a pose was found by: in work.Vt. */

@@ -48,10 +48,10 @@ static bool look(const plr_sights *s, const plr_seen_known *known, const plr_pla
     plr_mat3_vec(q, at->R, known->w);
     for (unsigned i = 0; i < 3; i++)
         q[i] += at->t[i];
-    if (!(q[2] >= f->par.min_depth))
+    if (!(q[2] >= f->camera.min_depth))
         return false;
-    plr_stereo_project(e, &f->calibration.eye, q);
-    plr_stereo_jacobian(Dz, &f->calibration.eye, q);
+    plr_stereo_project(e, &f->camera.estimate.eye, q);
+    plr_stereo_jacobian(Dz, &f->camera.estimate.eye, q);
     plr_mat3_mul(DzR, Dz, at->R);
     plr_mat3_mul(DzRP, DzR, known->P);
     plr_mat3_mul_nt(S, DzRP, DzR);
@@ -186,7 +186,7 @@ static bool axes_of(const plr_real a[3], const plr_real b[3], const plr_real c[3
 static bool place_by_three(const plr_sights *s, const unsigned of[3], plr_placing *at) {
     plr_real q[3][3], Dq[9], in_camera[9], in_world[9], turned[3];
     for (unsigned k = 0; k < 3; k++)
-        plr_stereo_back_project(q[k], Dq, &s->f->calibration.eye, s->seen[of[k]].z);
+        plr_stereo_back_project(q[k], Dq, &s->f->camera.estimate.eye, s->seen[of[k]].z);
     if (!axes_of(q[0], q[1], q[2], in_camera) ||
         !axes_of(s->seen[of[0]].w, s->seen[of[1]].w, s->seen[of[2]].w, in_world))
         return false;

@@ -51,23 +51,23 @@ enum { ANCHOR_FRAMES = 10 };
 #define FOUND_S PLR_R(0.5)
 
 void plr_alignment_clear(plr_filter *f) {
-    memset(&f->inertial, 0, sizeof f->inertial);
+    memset(&f->source.inertial, 0, sizeof f->source.inertial);
     if (plr_has_block(f, PLR_BLOCK_VELOCITY))
-        memset(&f->either.alignment, 0, sizeof f->either.alignment);
+        memset(&f->source.either.alignment, 0, sizeof f->source.either.alignment);
 }
 
 void plr_alignment_restart(plr_filter *f) {
-    const plr_alignment before = f->either.alignment;
-    memset(&f->either.alignment, 0, sizeof f->either.alignment);
-    f->either.alignment.first_ns = before.first_ns;
-    f->either.alignment.seen_to_move = before.seen_to_move;
+    const plr_alignment before = f->source.either.alignment;
+    memset(&f->source.either.alignment, 0, sizeof f->source.either.alignment);
+    f->source.either.alignment.first_ns = before.first_ns;
+    f->source.either.alignment.seen_to_move = before.seen_to_move;
 }
 
 /* What is being averaged ends at a pause, and altogether where the clock became another. */
 static void end_stretch(plr_filter *f, plr_time_ns t_ns) {
-    if (!f->reading_valid)
-        memset(&f->either.alignment, 0, sizeof f->either.alignment);
-    else if (t_ns - f->reading_ns > PAUSE_NS)
+    if (!f->source.reading_valid)
+        memset(&f->source.either.alignment, 0, sizeof f->source.either.alignment);
+    else if (t_ns - f->source.reading_ns > PAUSE_NS)
         plr_alignment_restart(f);
 }
 
@@ -132,20 +132,21 @@ static bool pictures_stand(const plr_alignment *at) {
 
 /* True if the readings say by themselves that the body rests: an engine may run, no hand may walk. */
 static bool is_calm(const plr_filter *f, const plr_alignment *at, plr_real interval) {
-    return is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval) &&
-           is_steady(at, 3, SPREAD_GYRO, f->par.gyro_density / interval);
+    return is_steady(at, 0, SPREAD_ACCEL, f->source.accel_density / interval) &&
+           is_steady(at, 3, SPREAD_GYRO, f->source.gyro_density / interval);
 }
 
 /* Whether the body rests, and what speaks against it: MOVES, or a gyro that turns meanwhile. Calm readings say
  * it alone. Motors that idle shake them more than a hand does: then it takes the pictures, and means that do
  * not wander. */
 static plr_imu_fault find_unrest(const plr_filter *f, const plr_alignment *at, plr_real interval) {
-    const plr_real noise[2] = {f->par.accel_density / interval, f->par.gyro_density / interval};
-    const plr_real turn = BIAS_SIGMAS * f->bias_prior_sigma[3] + SLOW_TURN;
+    const plr_real noise[2] = {f->source.accel_density / interval,
+                               f->source.gyro_density / interval};
+    const plr_real turn = BIAS_SIGMAS * f->source.bias_prior_sigma[3] + SLOW_TURN;
     const bool still = is_steady(at, 0, SPREAD_ACCEL, noise[0]), seen = pictures_stand(at);
     plr_real rate[3];
     for (unsigned i = 0; i < 3; i++)
-        rate[i] = at->mean[3 + i] - f->bias_prior[3 + i];
+        rate[i] = at->mean[3 + i] - f->source.bias_prior[3 + i];
     const plr_real rate2 = plr_dot3(rate, rate);
     const bool is_bias = rate2 <= turn * turn || (seen && rate2 <= MOST_BIAS * MOST_BIAS);
     if (!is_bias)
@@ -161,20 +162,20 @@ static plr_imu_fault find_unrest(const plr_filter *f, const plr_alignment *at, p
 static void tilt(plr_filter *f, const plr_real u[3]) {
     static const plr_real half_turn[9] = {1, 0, 0, 0, -1, 0, 0, 0, -1};
     plr_real before[9], axis[3], W[9], turn[9];
-    memcpy(before, f->R_WB, sizeof before);
+    memcpy(before, f->belief.R_WB, sizeof before);
     if (plr_dot3(u, before + 6) < PLR_R(-0.9)) /* the formula below has no answer there */
-        plr_mat3_mul(f->R_WB, before, half_turn);
-    const plr_real *up = f->R_WB + 6; /* R_WB^T e_z, to which u is to be turned */
+        plr_mat3_mul(f->belief.R_WB, before, half_turn);
+    const plr_real *up = f->belief.R_WB + 6; /* R_WB^T e_z, to which u is to be turned */
     plr_cross3(axis, u, up);
     const plr_real share = PLR_R(1) / (PLR_R(1) + plr_dot3(u, up));
     plr_skew(W, axis);
     plr_mat3_mul(turn, W, W);
     for (int i = 0; i < 9; i++)
         turn[i] = PLR_FMA(share, turn[i], W[i]) + (i % 4 == 0 ? PLR_R(1) : PLR_R(0));
-    memcpy(before, f->R_WB, sizeof before);
-    plr_mat3_mul(f->R_WB, before, turn);
-    plr_so3_orthonormalise(f->R_WB);
-    plr_so3_orthonormalise(f->R_WB);
+    memcpy(before, f->belief.R_WB, sizeof before);
+    plr_mat3_mul(f->belief.R_WB, before, turn);
+    plr_so3_orthonormalise(f->belief.R_WB);
+    plr_so3_orthonormalise(f->belief.R_WB);
 }
 
 /* X = scale (I - u u^T), 3x3: what lies across the unit vector u. */
@@ -205,7 +206,7 @@ static void set_tilt_covariance(plr_filter *f, const plr_real u[3], const plr_re
 static void set_velocity(plr_filter *f, const plr_real v[3], const plr_real variance[3]) {
     double P_v[PLR_VELOCITY_DIM];
     for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++) {
-        f->inertial.velocity[i] = v[i];
+        f->belief.velocity[i] = v[i];
         P_v[i] = (double)variance[i];
     }
     plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, P_v);
@@ -218,19 +219,20 @@ static void set_unknown_velocity(plr_filter *f, plr_real variance) {
 }
 
 static void begin(plr_filter *f, plr_time_ns t_ns, plr_real interval) {
-    plr_inertial *s = &f->inertial;
+    plr_inertial *s = &f->source.inertial;
     s->started = 1;
     s->started_ns = s->still_ns = t_ns;
-    f->bias_walked_s = 0; /* the biases begin with their prior's variances */
+    f->source.bias_walked_s = 0; /* the biases begin with their prior's variances */
     s->usual_s = interval;
-    memcpy(s->slow, f->either.alignment.mean, sizeof s->slow);
-    memset(&f->either.alignment, 0, sizeof f->either.alignment); /* as after a restore */
+    memcpy(s->slow, f->source.either.alignment.mean, sizeof s->slow);
+    memset(&f->source.either.alignment, 0,
+           sizeof f->source.either.alignment); /* as after a restore */
 }
 
 /* The unit vector of a mean specific force less its bias; returns its length, m/s^2. */
 static plr_real measured_up(const plr_filter *f, const plr_real mean[3], plr_real u[3]) {
     for (unsigned i = 0; i < 3; i++)
-        u[i] = mean[i] - f->bias[i];
+        u[i] = mean[i] - f->belief.bias[i];
     const plr_real length = PLR_SQRT(plr_dot3(u, u));
     for (unsigned i = 0; i < 3 && length > 0; i++)
         u[i] /= length;
@@ -249,7 +251,7 @@ typedef struct gravity_limits {
 /* What speaks against this mean specific force, if anything; in_pose: its direction tells. */
 static plr_imu_fault find_fault(const plr_filter *f, const plr_real u[3], plr_real length,
                                 const gravity_limits *due, bool in_pose) {
-    const plr_real g = f->par.gravity, up = plr_dot3(u, f->R_WB + 6);
+    const plr_real g = f->source.gravity, up = plr_dot3(u, f->belief.R_WB + 6);
     if (length < PLR_R(0.3) * g && length > PLR_R(0.05) * g)
         return PLR_IMU_FAULT_IN_G;
     if (length < due->least || length > due->most)
@@ -263,29 +265,30 @@ static plr_imu_fault find_fault(const plr_filter *f, const plr_real u[3], plr_re
  * accelerometer's bias: theta = [u]x db_a / g. */
 static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, const plr_real u[3]) {
     enum { A = 0, G = 3 };
-    const plr_alignment *at = &f->either.alignment;
-    const plr_real readings = (plr_real)at->count, g2 = f->par.gravity * f->par.gravity;
+    const plr_alignment *at = &f->source.either.alignment;
+    const plr_real readings = (plr_real)at->count, g2 = f->source.gravity * f->source.gravity;
     const bool calm = is_calm(f, at, interval); /* else the pictures have said that it rests */
     const plr_real speed = calm ? REST_VELOCITY : SEEN_VELOCITY;
-    const plr_real measured = variance_of(at, 3, f->par.gyro_density / interval) / readings +
+    const plr_real measured = variance_of(at, 3, f->source.gyro_density / interval) / readings +
                               (calm ? PLR_R(0) : SLOW_TURN * SLOW_TURN);
-    const plr_real flicker = variance_of(at, 0, f->par.accel_density / interval) / (readings * g2);
+    const plr_real flicker =
+        variance_of(at, 0, f->source.accel_density / interval) / (readings * g2);
     plr_real L[9], theta[9], cross[PLR_POSE_DIM * PLR_BIAS_DIM] = {0};
     double variance[PLR_BIAS_DIM];
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-        variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
+        variance[i] = (double)f->source.bias_prior_sigma[i] * (double)f->source.bias_prior_sigma[i];
     for (unsigned i = G; i < PLR_BIAS_DIM; i++) {
-        const double off = (double)(at->mean[i] - f->bias_prior[i]);
+        const double off = (double)(at->mean[i] - f->source.bias_prior[i]);
         const bool agrees = off * off <= 9 * (variance[i] + (double)measured);
         if (variance[i] <= (double)measured && agrees)
             continue;
-        f->bias[i] = f->bias_prior[i] = at->mean[i];
-        f->bias_prior_sigma[i] = PLR_SQRT(measured);
+        f->belief.bias[i] = f->source.bias_prior[i] = at->mean[i];
+        f->source.bias_prior_sigma[i] = PLR_SQRT(measured);
         variance[i] = (double)measured;
     }
     plr_skew(L, u);
     for (unsigned i = 0; i < 9; i++)
-        L[i] /= f->par.gravity;
+        L[i] /= f->source.gravity;
     across(u, flicker, theta);
     for (unsigned i = 0; i < 3; i++)
         for (unsigned j = 0; j < 3; j++) {
@@ -299,7 +302,7 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
     set_tilt_covariance(f, u, theta);
     plr_covariance_set(f, PLR_BLOCK_BIAS, PLR_BLOCK_POSE, cross);
     begin(f, t_ns, interval);
-    f->inertial.anchored = PLR_ANCHORED;
+    f->source.inertial.anchored = PLR_ANCHORED;
 }
 
 /* In motion: the tilt from a moment's mean, with a velocity that the first frames will find. */
@@ -308,7 +311,7 @@ static void start_in_motion(plr_filter *f, plr_time_ns t_ns, plr_real interval,
     plr_real theta[9];
     across(u, TILT * TILT, theta);
     tilt(f, u);
-    set_unknown_velocity(f, f->par.start_velocity_variance);
+    set_unknown_velocity(f, f->source.start_velocity_variance);
     set_tilt_covariance(f, u, theta);
     begin(f, t_ns, interval);
 }
@@ -316,18 +319,18 @@ static void start_in_motion(plr_filter *f, plr_time_ns t_ns, plr_real interval,
 void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
                          const plr_real variance[PLR_VELOCITY_DIM]) {
     set_velocity(f, v, variance);
-    begin(f, f->t_ns, 0);
-    f->inertial.anchored = PLR_ANCHORED;
+    begin(f, f->belief.t_ns, 0);
+    f->source.inertial.anchored = PLR_ANCHORED;
 }
 
 void plr_alignment_does_not_stand(plr_filter *f, plr_imu_fault how) {
-    if (f->inertial.fault != PLR_IMU_FAULT_TURNS)
-        f->inertial.fault = (uint8_t)how;
+    if (f->source.inertial.fault != PLR_IMU_FAULT_TURNS)
+        f->source.inertial.fault = (uint8_t)how;
 }
 
 /* Starts if the stretch that was averaged is good for it. */
 static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
-    plr_alignment *at = &f->either.alignment;
+    plr_alignment *at = &f->source.either.alignment;
     plr_real u[3];
     const plr_real interval =
         (plr_real)((double)(t_ns - at->begin_ns) * 1e-9 / (double)(at->count - 1));
@@ -337,12 +340,13 @@ static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
         plr_alignment_does_not_stand(f, unrest);
         return false;
     }
-    const plr_real g = f->par.gravity;
+    const plr_real g = f->source.gravity;
     const gravity_limits resting = {g - NOT_GRAVITY, g + NOT_GRAVITY, PLR_R(1) - OTHER_TILT};
     const gravity_limits moving = {0, ANY_LENGTH, ANY_TILT};
-    f->inertial.fault =
-        (uint8_t)find_fault(f, u, length, at_rest ? &resting : &moving, f->inertial.pose_given);
-    if (f->inertial.fault != PLR_IMU_FAULT_NONE && f->inertial.fault != PLR_IMU_FAULT_TILT)
+    f->source.inertial.fault = (uint8_t)find_fault(f, u, length, at_rest ? &resting : &moving,
+                                                   f->source.inertial.pose_given);
+    if (f->source.inertial.fault != PLR_IMU_FAULT_NONE &&
+        f->source.inertial.fault != PLR_IMU_FAULT_TILT)
         return false;
     if (at_rest)
         start_at_rest(f, t_ns, interval, u);
@@ -353,11 +357,11 @@ static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
 
 void plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
     const plr_imu_start kind = (plr_imu_start)f->config.imu_start;
-    plr_alignment *at = &f->either.alignment;
+    plr_alignment *at = &f->source.either.alignment;
     if (kind == PLR_IMU_START_GIVEN) {
-        if (!f->inertial.pose_given)
+        if (!f->source.inertial.pose_given)
             return;
-        set_unknown_velocity(f, f->par.start_velocity_variance);
+        set_unknown_velocity(f, f->source.start_velocity_variance);
         begin(f, t_ns, 0);
         return;
     }
@@ -371,7 +375,7 @@ void plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
     if (stretch >= REST_NS && kind != PLR_IMU_START_MOTION)
         started = try_to_start(f, t_ns, true);
     const bool doubtful =
-        f->inertial.fault == PLR_IMU_FAULT_TURNS; /* the gyro is wrong, or soon rests */
+        f->source.inertial.fault == PLR_IMU_FAULT_TURNS; /* the gyro is wrong, or soon rests */
     if (!started && may_move && !doubtful && stretch >= GLANCE_NS && at->count > 1)
         started = try_to_start(f, t_ns, false);
     if (!started && stretch >= REST_NS)
@@ -380,9 +384,9 @@ void plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
 
 /* What speaks against the readings' mean of half a second, whatever the body does meanwhile. */
 static plr_imu_fault find_doubt(const plr_filter *f) {
-    const plr_real g = f->par.gravity, *rate = f->inertial.slow + 3;
+    const plr_real g = f->source.gravity, *rate = f->source.inertial.slow + 3;
     plr_real u[3];
-    const plr_real length = measured_up(f, f->inertial.slow, u);
+    const plr_real length = measured_up(f, f->source.inertial.slow, u);
     const bool carried = length > PLR_R(0.7) * g && length < PLR_R(1.3) * g;
     if (carried && plr_dot3(rate, rate) > SPINS * SPINS)
         return PLR_IMU_FAULT_TURNS;
@@ -393,8 +397,9 @@ static plr_imu_fault find_doubt(const plr_filter *f) {
 }
 
 void plr_alignment_watch_gravity(plr_filter *f) {
-    plr_inertial *s = &f->inertial;
-    const bool watches = s->fault == PLR_IMU_FAULT_NONE && f->t_ns - s->started_ns <= WATCH_NS;
+    plr_inertial *s = &f->source.inertial;
+    const bool watches =
+        s->fault == PLR_IMU_FAULT_NONE && f->belief.t_ns - s->started_ns <= WATCH_NS;
     const bool doubts = s->fault > PLR_IMU_FAULT_NONE && s->fault < PLR_IMU_FAULT_TILT;
     if (!s->started || !(watches || doubts))
         return;
@@ -402,8 +407,8 @@ void plr_alignment_watch_gravity(plr_filter *f) {
     if ((doubt != PLR_IMU_FAULT_NONE) == doubts)
         s->doubts = 0; /* nothing new */
     else if (s->doubts++ == 0)
-        s->doubted_ns = f->t_ns;
-    if (s->doubts >= WATCH_FRAMES && f->t_ns - s->doubted_ns >= DOUBT_NS) {
+        s->doubted_ns = f->belief.t_ns;
+    if (s->doubts >= WATCH_FRAMES && f->belief.t_ns - s->doubted_ns >= DOUBT_NS) {
         s->fault = (uint8_t)doubt;
         s->doubts = 0;
     } else if (s->doubts > WATCH_FRAMES) {
@@ -414,19 +419,20 @@ void plr_alignment_watch_gravity(plr_filter *f) {
 /* ---------------------------------------------------------------- the anchor */
 
 bool plr_alignment_is_unsettled(const plr_filter *f) {
-    return f->inertial.started && f->inertial.anchored != PLR_ANCHORED;
+    return f->source.inertial.started && f->source.inertial.anchored != PLR_ANCHORED;
 }
 
 void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns) {
-    if (!f->inertial.started)
+    if (!f->source.inertial.started)
         return;
-    f->inertial.started_ns += t_ns - f->t_ns; /* unsigned: a time before zero wraps, and back */
-    f->inertial.still_ns += t_ns - f->t_ns;
+    f->source.inertial.started_ns +=
+        t_ns - f->belief.t_ns; /* unsigned: a time before zero wraps, and back */
+    f->source.inertial.still_ns += t_ns - f->belief.t_ns;
 }
 
 void plr_alignment_keep_world(plr_filter *f) {
-    if (f->config.process == PLR_PROCESS_IMU && f->inertial.anchored == PLR_ANCHOR_DUE)
-        f->inertial.anchored = PLR_WORLD_IS_GIVEN;
+    if (f->config.process == PLR_PROCESS_IMU && f->source.inertial.anchored == PLR_ANCHOR_DUE)
+        f->source.inertial.anchored = PLR_WORLD_IS_GIVEN;
 }
 
 /* Adds variances of the position, in each direction, and of the yaw, about the vertical u. */
@@ -450,18 +456,18 @@ static void forget_place(plr_filter *f, const plr_real u[3]) {
 }
 
 void plr_alignment_anchor(plr_filter *f) {
-    const plr_inertial *s = &f->inertial;
+    const plr_inertial *s = &f->source.inertial;
     const plr_real variance = (plr_real)(f->config.start_sigma * f->config.start_sigma);
-    const plr_real *u = f->R_WB + 6; /* R_WB^T e_z */
+    const plr_real *u = f->belief.R_WB + 6; /* R_WB^T e_z */
     if (!plr_alignment_is_unsettled(f) || s->frames < ANCHOR_FRAMES ||
-        f->t_ns - s->started_ns < ANCHOR_NS || f->motion.pending)
+        f->belief.t_ns - s->started_ns < ANCHOR_NS || f->motion.pending)
         return;
     if (s->anchored == PLR_WORLD_IS_GIVEN) {
-        const plr_real way2 = f->par.start_velocity_variance * (FOUND_S * FOUND_S);
+        const plr_real way2 = f->source.start_velocity_variance * (FOUND_S * FOUND_S);
         add_to_pose(f, u, TILT * TILT * way2, TILT * TILT * (TILT * TILT));
     } else {
         forget_place(f, u);
         add_to_pose(f, u, variance, variance);
     }
-    f->inertial.anchored = PLR_ANCHORED;
+    f->source.inertial.anchored = PLR_ANCHORED;
 }

@@ -37,7 +37,7 @@ static void lay_out(plr_filter *f) {
 /* gamma = R_WB^T (0, 0, -g): gravity's acceleration in body axes, m/s^2. */
 static void gravity(const plr_filter *f, plr_real gamma[3]) {
     for (int i = 0; i < 3; i++)
-        gamma[i] = -f->par.gravity * f->R_WB[6 + i];
+        gamma[i] = -f->source.gravity * f->belief.R_WB[6 + i];
 }
 
 /* ---------------------------------------------------------------- one step */
@@ -66,8 +66,8 @@ static void integrate(const plr_filter *f, const plr_real reading[PLR_READING_DI
     plr_so3_series c;
     s->tau = tau;
     for (int i = 0; i < 3; i++) {
-        s->a[i] = reading[i] - f->bias[i];
-        phi[i] = tau * (reading[3 + i] - f->bias[3 + i]);
+        s->a[i] = reading[i] - f->belief.bias[i];
+        phi[i] = tau * (reading[3 + i] - f->belief.bias[3 + i]);
     }
     gravity(f, s->gamma);
     plr_so3_series_at(&c, plr_dot3(phi, phi));
@@ -81,7 +81,7 @@ static void integrate(const plr_filter *f, const plr_real reading[PLR_READING_DI
             s->Et[3 * i + j] = s->E[3 * j + i] + (i == j ? PLR_R(1) : PLR_R(0));
     plr_mat3_vec(g1, s->G1, s->a);
     plr_mat3_vec(g2, s->G2, s->a);
-    const plr_real *v = f->inertial.velocity;
+    const plr_real *v = f->belief.velocity;
     for (int i = 0; i < 3; i++) {
         s->d[i] = tau * PLR_FMA(tau, PLR_FMA(PLR_R(0.5), s->gamma[i], g2[i]), v[i]);
         next[i] = PLR_FMA(tau, s->gamma[i] + g1[i], v[i]);
@@ -93,9 +93,9 @@ static plr_status check(const plr_filter *f, const plr_real reading[PLR_READING_
                         plr_real seconds) {
     plr_real turn2 = 0, way2 = 0;
     for (int i = 0; i < 3; i++) {
-        const plr_real turn = seconds * (reading[3 + i] - f->bias[3 + i]);
-        const plr_real way = seconds * (plr_abs(f->inertial.velocity[i]) +
-                                        seconds * (plr_abs(reading[i]) + f->par.gravity));
+        const plr_real turn = seconds * (reading[3 + i] - f->belief.bias[3 + i]);
+        const plr_real way = seconds * (plr_abs(f->belief.velocity[i]) +
+                                        seconds * (plr_abs(reading[i]) + f->source.gravity));
         turn2 += turn * turn;
         way2 += way * way;
     }
@@ -154,7 +154,7 @@ static void transition(const plr_imu_step *s, plr_real F[MOVED * DIM]) {
 /* The derivatives of the whole motion by the drivers: B of its error n, V of the velocity. */
 static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
                                    const plr_real F[MOVED * DIM]) {
-    plr_real *B = f->motion.B, *V = f->core_motion.V, tau = s->tau;
+    plr_real *B = f->motion.B, *V = f->motion.core.V, tau = s->tau;
     plr_real theta[3 * D] = {0}, way[3 * D], speed[3 * D], cross[3];
     for (unsigned i = 0; i < 3; i++) { /* theta now by the drivers: R_D^T theta + B_theta */
         memcpy(theta + D * i, B + D * (THETA + i), D * sizeof *B);
@@ -189,7 +189,7 @@ static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
 
 /* The covariance of the motion's noise: of n, velocity and biases together, 15 x 15. */
 static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
-    const plr_core_motion *m = &f->core_motion;
+    const plr_core_motion *m = &f->motion.core;
     for (unsigned i = 0; i < VEL; i++) {
         memcpy(Q + DIM * i, f->motion.Q + PLR_POSE_DIM * i, PLR_POSE_DIM * sizeof *Q);
         memcpy(Q + DIM * i + VEL, m->Q_nc + PLR_REST_DIM * i, PLR_REST_DIM * sizeof *Q);
@@ -203,7 +203,7 @@ static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
 }
 
 static void put_noise(plr_filter *f, const plr_real Q[DIM * DIM]) {
-    plr_core_motion *m = &f->core_motion;
+    plr_core_motion *m = &f->motion.core;
     for (unsigned i = 0; i < VEL; i++) {
         memcpy(f->motion.Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
         memcpy(m->Q_nc + PLR_REST_DIM * i, Q + DIM * i + VEL, PLR_REST_DIM * sizeof *Q);
@@ -250,8 +250,8 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
  * scatter about their neighbours, if that is more. A vibration that is true motion counts, too: sampled so that
  * neighbours tell little of each other it cannot be integrated. */
 static plr_real density_of(const plr_filter *f, unsigned which) {
-    const plr_real stated = which == 0 ? f->par.accel_density : f->par.gyro_density;
-    const plr_real shown = f->inertial.scatter2[which] * f->inertial.usual_s;
+    const plr_real stated = which == 0 ? f->source.accel_density : f->source.gyro_density;
+    const plr_real shown = f->source.inertial.scatter2[which] * f->source.inertial.usual_s;
     return shown > stated ? shown : stated;
 }
 
@@ -265,14 +265,14 @@ static plr_real density_of(const plr_filter *f, unsigned which) {
  * changes meanwhile: at first as successive readings differ, later as they scatter at all. */
 static void densities(const plr_filter *f, const plr_process_step *by, const plr_real gamma[3],
                       plr_real density[2]) {
-    const plr_inertial *at = &f->inertial;
-    const plr_real g = f->par.gravity, scatter2 = UNLIKELY * at->scatter2[0];
+    const plr_inertial *at = &f->source.inertial;
+    const plr_real g = f->source.gravity, scatter2 = UNLIKELY * at->scatter2[0];
     plr_real forced[3], turned[3];
     for (unsigned i = 0; i < 2; i++)
         density[i] = density_of(f, i);
     for (int i = 0; i < 3; i++) {
-        forced[i] = by->whole[i] - f->bias[i] + gamma[i];
-        turned[i] = by->whole[3 + i] - f->bias[3 + i];
+        forced[i] = by->whole[i] - f->belief.bias[i] + gamma[i];
+        turned[i] = by->whole[3 + i] - f->belief.bias[3 + i];
     }
     const plr_real beyond2 = plr_dot3(forced, forced) - (scatter2 > g * g ? scatter2 : g * g);
     if (beyond2 > 0) {
@@ -340,8 +340,9 @@ static void move_noise(plr_filter *f, const plr_imu_step *s, const plr_real F[MO
     reading[1] /= tau;
     transport_noise(f, F, reading);
     for (unsigned i = ACCEL - VEL; i < PLR_REST_DIM; i++) {
-        plr_real *q = &f->core_motion.Q_cc[(PLR_REST_DIM + 1) * i];
-        *q = PLR_FMA(i < GYRO - VEL ? f->par.accel_walk : f->par.gyro_walk, tau, *q);
+        plr_real *q = &f->motion.core.Q_cc[(PLR_REST_DIM + 1) * i];
+        *q = PLR_FMA(i < GYRO - VEL ? f->source.accel_walk_variance : f->source.gyro_walk_variance,
+                     tau, *q);
     }
 }
 
@@ -355,10 +356,10 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
     accumulate_derivatives(f, &s, F);
     move_noise(f, &s, F, by);
     plr_pose_move(f, s.E, s.d);
-    memcpy(f->inertial.velocity, s.v, sizeof s.v);
+    memcpy(f->belief.velocity, s.v, sizeof s.v);
     plr_se3_append(m->E, m->p, s.E, s.d);
     plr_so3_orthonormalise_small(m->E);
-    f->t_ns = t_ns;
+    f->belief.t_ns = t_ns;
     m->seconds += seconds;
     m->pending = 1;
     m->noisy = 1;
@@ -368,7 +369,7 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_process_step *step) {
-    const bool makes_up = plr_seconds(t_ns - f->reading_ns) <= BRIDGED_S;
+    const bool makes_up = plr_seconds(t_ns - f->source.reading_ns) <= BRIDGED_S;
     plr_mean_reading(f, f->config.imu_timing, makes_up, t_ns, reading, step);
 }
 
@@ -379,15 +380,15 @@ static void walk(plr_filter *f, plr_real seconds) {
 }
 
 static plr_real bias_walk(const plr_filter *f, unsigned k) {
-    return k < 3 ? f->par.accel_walk : f->par.gyro_walk;
+    return k < 3 ? f->source.accel_walk_variance : f->source.gyro_walk_variance;
 }
 
 static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
     plr_real gamma[3];
     gravity(f, gamma);
     for (int i = 0; i < 3; i++) {
-        reading[i] = f->bias[i] - gamma[i];
-        reading[3 + i] = f->bias[3 + i];
+        reading[i] = f->belief.bias[i] - gamma[i];
+        reading[3 + i] = f->belief.bias[3 + i];
     }
 }
 
@@ -395,13 +396,13 @@ static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DI
     if (age > STALE_S)
         rest(f, held);
     else
-        memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
+        memcpy(held, f->source.reading, PLR_READING_DIM * sizeof *held);
 }
 
 /* ---------------------------------------------------------------- the estimate */
 
 static PLR_SELDOM void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
-    const plr_real *Q = f->core_motion.Q_cc;
+    const plr_real *Q = f->motion.core.Q_cc;
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
@@ -413,19 +414,19 @@ static PLR_SELDOM void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POS
 static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
                            plr_real P_u[PLR_POSE_SQUARE]) {
     enum { V = PLR_VELOCITY_DIM };
-    const plr_core_motion *m = &f->core_motion;
+    const plr_core_motion *m = &f->motion.core;
     plr_real P_dd[D * D], VP[V * D] = {0}, P_vv[V * V] = {0}, P_b[PLR_POSE_SQUARE];
     for (unsigned i = 0; i < V; i++) {
-        u[i] = f->inertial.velocity[i];
-        u[V + i] = f->reading[V + i] - f->bias[V + i];
+        u[i] = f->belief.velocity[i];
+        u[V + i] = f->source.reading[V + i] - f->belief.bias[V + i];
     }
     if (!P_u)
         return;
-    plr_covariance_with_drivers(f, f->layout.driver, D, P_dd);
+    plr_covariance_with_drivers(f, f->belief.layout.driver, D, P_dd);
     plr_gemm_nn(V, D, D, m->V, D, P_dd, D, VP, D);
     plr_gemm_nt(V, V, D, VP, D, m->V, D, P_vv, V);
     bias_covariance(f, P_b);
-    const plr_real density = density_of(f, 1), usual = f->inertial.usual_s;
+    const plr_real density = density_of(f, 1), usual = f->source.inertial.usual_s;
     const plr_real per_reading = usual > 0 ? density / usual : density;
     for (unsigned i = 0; i < V; i++)
         for (unsigned j = 0; j < V; j++) {
@@ -443,7 +444,7 @@ static void changes(const plr_filter *f, const plr_real u[PLR_POSE_DIM], plr_rea
     plr_cross3(turning, u + 3, u);
     gravity(f, change);
     for (int i = 0; i < 3; i++)
-        change[i] += f->reading[i] - f->bias[i] - turning[i];
+        change[i] += f->source.reading[i] - f->belief.bias[i] - turning[i];
 }
 
 /* The noise of the rate at a standstill is in theta too, where v = 0 finds it again: as if it were
@@ -455,9 +456,10 @@ static void changes(const plr_filter *f, const plr_real u[PLR_POSE_DIM], plr_rea
  * w alone (a standstill) the mean since the last one, which has less noise. */
 static PLR_SELDOM void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                                plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
-    const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);
+    const plr_real since = plr_seconds(f->belief.t_ns - f->source.inertial.still_ns);
     const plr_real most = since < PLR_R(0.5) ? since : PLR_R(0.5);
-    const plr_real usual = f->inertial.usual_s > 0 ? f->inertial.usual_s : PLR_R(1e-3);
+    const plr_real usual =
+        f->source.inertial.usual_s > 0 ? f->source.inertial.usual_s : PLR_R(1e-3);
     const plr_real density = density_of(f, 1);
     /* at the time of the last such row the mean is used up: one reading's worth is granted */
     const plr_real mean_of = most > 0 ? most : usual;
@@ -467,13 +469,13 @@ static PLR_SELDOM void measure(const plr_filter *f, const plr_twist_rows *rows, 
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real *M = rows->M + PLR_POSE_DIM * i;
         const bool moves = plr_dot3(M, M) > 0;
-        const plr_real *w_m = moves ? f->reading + 3 : f->inertial.slow + 3;
+        const plr_real *w_m = moves ? f->source.reading + 3 : f->source.inertial.slow + 3;
         const plr_real noise = moves ? density / usual : USED_TWICE * density / mean_of;
         r[i] = rows->z[i];
         R[i] = PLR_FMA(noise, plr_dot3(M + 3, M + 3), rows->R[i]);
         for (unsigned c = 0; c < 3; c++) {
-            const plr_real w = w_m[c] - f->bias[3 + c];
-            r[i] = PLR_FMA(-M[c], f->inertial.velocity[c], r[i]);
+            const plr_real w = w_m[c] - f->belief.bias[3 + c];
+            r[i] = PLR_FMA(-M[c], f->belief.velocity[c], r[i]);
             r[i] = PLR_FMA(-M[3 + c], w, r[i]);
             by_v[PLR_VELOCITY_DIM * i + c] = M[c];
             by_bias[PLR_BIAS_DIM * i + 3 + c] = -M[3 + c];

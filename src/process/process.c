@@ -11,13 +11,13 @@ void plr_lay_out(plr_filter *f, uint8_t velocity, uint8_t bias, uint8_t driver) 
     const uint8_t size[PLR_BLOCKS] = {PLR_POSE_DIM, velocity, bias};
     uint8_t row = 0;
     for (unsigned block = 0; block < PLR_BLOCKS; block++) {
-        f->layout.block[block].row = row;
-        f->layout.block[block].size = size[block];
+        f->belief.layout.block[block].row = row;
+        f->belief.layout.block[block].size = size[block];
         row = (uint8_t)(row + size[block]);
     }
-    f->layout.core = row;
-    f->layout.driver = driver;
-    f->layout.drivers = (uint8_t)(row - driver);
+    f->belief.layout.core = row;
+    f->belief.layout.driver = driver;
+    f->belief.layout.drivers = (uint8_t)(row - driver);
 }
 
 bool plr_step_is_possible(plr_real way2, plr_real turn2) {
@@ -26,16 +26,20 @@ bool plr_step_is_possible(plr_real way2, plr_real turn2) {
 
 void plr_mean_reading(const plr_filter *f, uint8_t timing, bool makes_up, plr_time_ns t_ns,
                       const plr_real reading[PLR_READING_DIM], plr_process_step *step) {
-    const uint8_t when = f->reading_valid ? timing : PLR_TWIST_END;
-    const bool cut = f->reading_valid && f->t_ns > f->reading_ns && t_ns > f->t_ns;
+    const uint8_t when = f->source.reading_valid ? timing : PLR_TWIST_END;
+    const bool cut =
+        f->source.reading_valid && f->belief.t_ns > f->source.reading_ns && t_ns > f->belief.t_ns;
     /* of differences in ns, so that a short rest is as exact as a long one */
-    const plr_real done_by_rest =
-        makes_up && cut ? plr_seconds(f->t_ns - f->reading_ns) / plr_seconds(t_ns - f->t_ns)
-                        : PLR_R(0);
+    const plr_real done_by_rest = makes_up && cut
+                                      ? plr_seconds(f->belief.t_ns - f->source.reading_ns) /
+                                            plr_seconds(t_ns - f->belief.t_ns)
+                                      : PLR_R(0);
     for (int i = 0; i < PLR_READING_DIM; i++) {
-        step->whole[i] = when == PLR_TWIST_END     ? reading[i]
-                         : when == PLR_TWIST_START ? f->reading[i]
-                                                   : PLR_R(0.5) * (f->reading[i] + reading[i]);
-        step->mean[i] = PLR_FMA(done_by_rest, step->whole[i] - f->reading[i], step->whole[i]);
+        step->whole[i] = when == PLR_TWIST_END ? reading[i]
+                         : when == PLR_TWIST_START
+                             ? f->source.reading[i]
+                             : PLR_R(0.5) * (f->source.reading[i] + reading[i]);
+        step->mean[i] =
+            PLR_FMA(done_by_rest, step->whole[i] - f->source.reading[i], step->whole[i]);
     }
 }

@@ -92,7 +92,7 @@ extern const plr_process plr_process_imu;
 
 /* False until an IMU is aligned with gravity; until then the state rests, but for mapping. */
 static inline bool plr_process_has_started(const plr_filter *f) {
-    return f->config.process != PLR_PROCESS_IMU || f->inertial.started != 0 ||
+    return f->config.process != PLR_PROCESS_IMU || f->source.inertial.started != 0 ||
            f->config.mode == PLR_MODE_MAPPING;
 }
 
@@ -102,7 +102,8 @@ static inline const plr_process *plr_process_of(const plr_filter *f) {
 
 /* The variance of bias k about its prior's mean, had nothing been learnt of it: it has walked. */
 static inline plr_real plr_bias_prior_variance(const plr_filter *f, unsigned k) {
-    const plr_real sigma = f->bias_prior_sigma[k], seconds = (plr_real)f->bias_walked_s;
+    const plr_real sigma = f->source.bias_prior_sigma[k],
+                   seconds = (plr_real)f->source.bias_walked_s;
     return sigma * sigma + seconds * plr_process_of(f)->bias_walk(f, k);
 }
 

@@ -16,7 +16,7 @@ void plr_statistics_change(const plr_filter *f, const plr_real reading[PLR_POSE_
                            plr_real change2[2]) {
     change2[0] = change2[1] = 0;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        const plr_real off = reading[i] - f->reading[i];
+        const plr_real off = reading[i] - f->source.reading[i];
         change2[i / 3] = PLR_FMA(off, off, change2[i / 3]);
     }
 }
@@ -24,11 +24,11 @@ void plr_statistics_change(const plr_filter *f, const plr_real reading[PLR_POSE_
 /* Each reading is compared with the line through the two before it: their second difference has six times
  * the variance of one, and a motion that goes on evenly is not in it. */
 static void learn_scatter(plr_filter *f, const plr_real reading[PLR_POSE_DIM], plr_real interval) {
-    plr_inertial *s = &f->inertial;
+    plr_inertial *s = &f->source.inertial;
     const bool is_usual = interval < PLR_R(1.5) * s->usual_s;
     plr_real off2[2] = {0};
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        const plr_real change = (reading[i] - f->reading[i]) * (s->usual_s / interval);
+        const plr_real change = (reading[i] - f->source.reading[i]) * (s->usual_s / interval);
         const plr_real off = change - s->change[i];
         off2[i / 3] = PLR_FMA(off, off, off2[i / 3]);
         s->change[i] = change;
@@ -40,12 +40,12 @@ static void learn_scatter(plr_filter *f, const plr_real reading[PLR_POSE_DIM], p
 
 void plr_statistics_learn(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
                           plr_real interval, const plr_real change2[2]) {
-    plr_inertial *s = &f->inertial;
-    if (!f->reading_valid) {
+    plr_inertial *s = &f->source.inertial;
+    if (!f->source.reading_valid) {
         memcpy(s->slow, reading, sizeof s->slow);
-        s->still_ns = f->t_ns;
+        s->still_ns = f->belief.t_ns;
     }
-    if (!f->reading_valid || !(interval > 0))
+    if (!f->source.reading_valid || !(interval > 0))
         return;
     if (!(s->usual_s > 0) || interval < PLR_R(0.5) * s->usual_s)
         s->usual_s = interval;

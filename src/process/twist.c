@@ -20,7 +20,7 @@ static void lay_out(plr_filter *f) {
 }
 
 static plr_real bias_walk(const plr_filter *f, unsigned k) {
-    return k < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk;
+    return k < 3 ? f->source.bias_velocity_walk : f->source.bias_gyro_walk;
 }
 
 static void walk(plr_filter *f, plr_real seconds) {
@@ -42,17 +42,17 @@ static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) 
 static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
                            plr_real P_u[PLR_POSE_SQUARE]) {
     for (int i = 0; i < PLR_POSE_DIM; i++)
-        u[i] = f->reading[i] - f->bias[i];
+        u[i] = f->source.reading[i] - f->belief.bias[i];
     if (!P_u)
         return;
     /* with noise = step the sigmas are those of a displacement: divide by the step */
-    const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
-                               ? PLR_R(1) / (f->interval_s * f->interval_s)
+    const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->source.interval_s > 0
+                               ? PLR_R(1) / (f->source.interval_s * f->source.interval_s)
                                : PLR_R(1);
     bias_covariance(f, P_u);
     for (int i = 0; i < 3; i++) {
-        P_u[(PLR_POSE_DIM + 1) * i] += scale * f->par.velocity_variance[i];
-        P_u[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->par.gyro_variance[i];
+        P_u[(PLR_POSE_DIM + 1) * i] += scale * f->source.velocity_variance[i];
+        P_u[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->source.gyro_variance[i];
     }
 }
 
@@ -60,7 +60,7 @@ static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
 static void displacement(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                          plr_real seconds, plr_real xi[PLR_POSE_DIM]) {
     for (int i = 0; i < PLR_POSE_DIM; i++)
-        xi[i] = seconds * (reading[i] - f->bias[i]);
+        xi[i] = seconds * (reading[i] - f->belief.bias[i]);
 }
 
 static bool is_possible(const plr_real xi[PLR_POSE_DIM]) {
@@ -81,37 +81,37 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
                                ? (interval > 0 ? seconds / interval : PLR_R(1))
                                : seconds * interval;
     for (int i = 0; i < 3; i++) {
-        variance[i] = f->par.velocity_variance[i] * share;
-        variance[3 + i] = f->par.gyro_variance[i] * share;
+        variance[i] = f->source.velocity_variance[i] * share;
+        variance[3 + i] = f->source.gyro_variance[i] * share;
     }
 }
 
 /* Whether readings were lost in an interval of h seconds. Where intervals differ by much all along,
  * a long one is usual: its reading stands for all of it, to the sigma that was told. */
 static bool lost_readings(const plr_filter *f, plr_real h) {
-    const plr_real usual = f->inertial.usual_s, late = h - usual;
+    const plr_real usual = f->source.inertial.usual_s, late = h - usual;
     return usual > 0 && h > PLR_LONG_INTERVALS * usual &&
-           late * late > LATE_SIGMAS * LATE_SIGMAS * f->inertial.off_usual2;
+           late * late > LATE_SIGMAS * LATE_SIGMAS * f->source.inertial.off_usual2;
 }
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_process_step *step) {
-    const bool makes_up = !lost_readings(f, plr_seconds(t_ns - f->reading_ns));
+    const bool makes_up = !lost_readings(f, plr_seconds(t_ns - f->source.reading_ns));
     plr_mean_reading(f, f->config.twist_timing, makes_up, t_ns, reading, step);
 }
 
 static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
     (void)age;
-    memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
+    memcpy(held, f->source.reading, PLR_READING_DIM * sizeof *held);
 }
 
 /* The square of by how much a velocity is off that is held for n usual intervals: what readings
  * differ by beyond their noise, later what they scatter by. `which`: 0 linear, 1 angular. */
 static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
-    const plr_real *v = which == 0 ? f->par.velocity_variance : f->par.gyro_variance;
+    const plr_real *v = which == 0 ? f->source.velocity_variance : f->source.gyro_variance;
     const plr_real noise = (v[0] + v[1] + v[2]) / PLR_R(3);
-    const plr_real change = f->inertial.change2[which] - PLR_R(2) * noise;
-    const plr_real spread = f->inertial.spread2[which] - noise;
+    const plr_real change = f->source.inertial.change2[which] - PLR_R(2) * noise;
+    const plr_real spread = f->source.inertial.spread2[which] - noise;
     if (!(change > 0))
         return 0;
     const plr_real changed = PLR_R(0.25) * change * n * n;
@@ -121,14 +121,14 @@ static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
 
 static PLR_SELDOM bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
                               plr_real variance[PLR_POSE_DIM]) {
-    const plr_real usual = f->inertial.usual_s;
+    const plr_real usual = f->source.inertial.usual_s;
     if (!lost_readings(f, h1) || f->config.noise == PLR_NOISE_STEP)
         return false;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
         variance[i] = off2(f, i / 3, h1 / usual);
         if (next) { /* when it became what it is now is not known */
-            const plr_real *v = i < 3 ? f->par.velocity_variance : f->par.gyro_variance;
-            const plr_real step = next[i] - f->reading[i],
+            const plr_real *v = i < 3 ? f->source.velocity_variance : f->source.gyro_variance;
+            const plr_real step = next[i] - f->source.reading[i],
                            change = step * step - PLR_R(2) * v[i % 3];
             variance[i] += change > 0 ? change / PLR_R(3) : PLR_R(0);
         }
@@ -138,7 +138,7 @@ static PLR_SELDOM bool missed(const plr_filter *f, plr_real h0, plr_real h1, con
 }
 
 static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
-    memcpy(reading, f->bias, PLR_READING_DIM * sizeof *reading);
+    memcpy(reading, f->belief.bias, PLR_READING_DIM * sizeof *reading);
 }
 
 /* What the older reading had wrong in the part of the interval that it bridged counts by as much as the
@@ -175,7 +175,7 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
     plr_se3_expm1(E, p, xi);
     plr_se3_rotation(R, E);
     plr_se3_adjoint_inverse(A, R, p);
-    f->t_ns = t_ns;
+    f->belief.t_ns = t_ns;
     plr_pose_move(f, E, p);
     plr_se3_append(m->E, m->p, E, p);
     plr_so3_orthonormalise_small(m->E);

@@ -31,16 +31,16 @@ static plr_time_ns interval_of(const plr_held_velocity *held, plr_time_ns t_ns) 
 
 void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows) {
     PLR_ASSERT(which < PLR_HELD_VELOCITIES);
-    if (!f->velocities_known)
+    if (!f->source.velocities_known)
         plr_velocity_forget(f);
-    plr_held_velocity *held = &f->either.velocities.held[which];
-    const plr_time_ns before = held->interval_ns, interval = interval_of(held, f->t_ns);
+    plr_held_velocity *held = &f->source.either.velocities.held[which];
+    const plr_time_ns before = held->interval_ns, interval = interval_of(held, f->belief.t_ns);
     /* where a reading was lost or rejected, the interval of before */
     const plr_time_ns usual = before > 0 && before < interval ? before : interval;
     held->interval_ns = interval;
-    held->known = f->velocities_known = 1;
-    held->t_ns = f->t_ns;
-    held->until_ns = f->t_ns + HELD_INTERVALS * usual;
+    held->known = f->source.velocities_known = 1;
+    held->t_ns = f->belief.t_ns;
+    held->until_ns = f->belief.t_ns + HELD_INTERVALS * usual;
     memcpy(held->z, rows->z, sizeof held->z);
     memcpy(held->M, rows->M, sizeof held->M);
     for (unsigned r = 0; r < PLR_ROWS; r++)
@@ -48,26 +48,27 @@ void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows
 }
 
 void plr_velocity_forget(plr_filter *f) {
-    f->velocities_known = 0;
+    f->source.velocities_known = 0;
     if (!plr_has_block(f, PLR_BLOCK_VELOCITY)) /* else nothing is held, and the place is taken */
-        memset(&f->either.velocities, 0, sizeof f->either.velocities);
+        memset(&f->source.either.velocities, 0, sizeof f->source.either.velocities);
 }
 
 void plr_velocity_forget_bias(plr_filter *f) {
-    if (!f->velocities_known)
+    if (!f->source.velocities_known)
         return;
-    memset(f->either.velocities.bias_Lambda, 0, sizeof f->either.velocities.bias_Lambda);
-    memset(f->either.velocities.bias_eta, 0, sizeof f->either.velocities.bias_eta);
+    memset(f->source.either.velocities.bias_Lambda, 0,
+           sizeof f->source.either.velocities.bias_Lambda);
+    memset(f->source.either.velocities.bias_eta, 0, sizeof f->source.either.velocities.bias_eta);
 }
 
 /* For a step from the filter's time to end_ns. */
 static bool holds(const plr_filter *f, const plr_held_velocity *held, plr_time_ns end_ns) {
-    return held->known && f->t_ns >= held->t_ns && end_ns <= held->until_ns;
+    return held->known && f->belief.t_ns >= held->t_ns && end_ns <= held->until_ns;
 }
 
 bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns) {
-    for (unsigned i = 0; f->velocities_known && i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->either.velocities.held[i], end_ns))
+    for (unsigned i = 0; f->source.velocities_known && i < PLR_HELD_VELOCITIES; i++)
+        if (holds(f, &f->source.either.velocities.held[i], end_ns))
             return true;
     return false;
 }
@@ -75,7 +76,8 @@ bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns) {
 /* Lambda += Y^T Y, eta += Y^T e for e = U^-T (s z - M xi) = Y db + N(0, I), Y = -s U^-T M T. */
 static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
-    plr_real *eta = f->either.velocities.bias_eta, *Lambda = f->either.velocities.bias_Lambda;
+    plr_real *eta = f->source.either.velocities.bias_eta,
+             *Lambda = f->source.either.velocities.bias_Lambda;
     for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
             const plr_real *y = Y + PLR_POSE_DIM * r;
@@ -189,15 +191,15 @@ void plr_velocity_fuse(plr_filter *f, plr_time_ns end_ns, plr_real seconds,
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         T[(PLR_POSE_DIM + 1) * i] = 1;
     for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->either.velocities.held[i], end_ns))
-            fuse_one(f, &f->either.velocities.held[i], seconds, xi, V, T);
+        if (holds(f, &f->source.either.velocities.held[i], end_ns))
+            fuse_one(f, &f->source.either.velocities.held[i], seconds, xi, V, T);
 }
 
 /* ---------------------------------------------------------------- the biases */
 
 bool plr_velocity_informs_bias(const plr_filter *f) {
-    for (unsigned i = 0; f->velocities_known && i < PLR_BIAS_DIM; i++)
-        if (f->either.velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
+    for (unsigned i = 0; f->source.velocities_known && i < PLR_BIAS_DIM; i++)
+        if (f->source.either.velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
             return true;
     return false;
 }
@@ -205,10 +207,10 @@ bool plr_velocity_informs_bias(const plr_filter *f) {
 /* With Lambda = L L^T: L^T db = L^-1 eta + N(0, I). */
 void plr_velocity_bias_rows(const plr_filter *f, unsigned part, plr_rows *H, plr_real r[PLR_ROWS]) {
     plr_real L[PLR_POSE_SQUARE], y[PLR_BIAS_DIM];
-    plr_factor6(L, f->either.velocities.bias_Lambda);
+    plr_factor6(L, f->source.either.velocities.bias_Lambda);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
         const plr_real pivot = L[(PLR_BIAS_DIM + 1) * k];
-        y[k] = f->either.velocities.bias_eta[k];
+        y[k] = f->source.either.velocities.bias_eta[k];
         for (unsigned l = 0; l < k; l++)
             y[k] = PLR_FMA(-L[PLR_BIAS_DIM * k + l], y[l], y[k]);
         y[k] = pivot > 0 ? y[k] / pivot : PLR_R(0);

@@ -16,7 +16,7 @@ typedef struct plr_sensor_kind {
     void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
 
     /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how
-     * many times. They are held in f->either.velocities.held[place] and after it. */
+     * many times. They are held in f->source.either.velocities.held[place] and after it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 

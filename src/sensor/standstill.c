@@ -32,8 +32,8 @@ const plr_sensor_kind plr_standstill = {
 /* The squared distance of a landmark's pixels from those that it was anchored at, in their noise
  * and in what its track has wandered since. */
 static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real z[PLR_ROWS]) {
-    const plr_real since = plr_seconds(f->t_ns - slot->anchor_ns);
-    const plr_real drift = f->par.track_drift * since;
+    const plr_real since = plr_seconds(f->belief.t_ns - slot->anchor_ns);
+    const plr_real drift = f->camera.track_drift_variance * since;
     plr_real sum = 0;
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real step = z[i] - slot->anchor[i];
@@ -44,7 +44,7 @@ static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real
 
 static void anchor(const plr_filter *f, plr_slot *slot, const plr_real z[PLR_ROWS]) {
     memcpy(slot->anchor, z, sizeof slot->anchor);
-    slot->anchor_ns = f->t_ns;
+    slot->anchor_ns = f->belief.t_ns;
     slot->anchored = 1;
 }
 
@@ -58,11 +58,11 @@ static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned
         plr_real z[PLR_ROWS];
         if (f->work.slot_of[k] == PLR_NO_SLOT)
             continue;
-        plr_slot *slot = &f->slots[f->work.slot_of[k]];
+        plr_slot *slot = &f->belief.slots[f->work.slot_of[k]];
         plr_stereo_rows(z, &frame->observations[f->work.order[k]]);
         if (!slot->anchored) {
             anchor(f, slot, z);
-        } else if (f->t_ns - slot->anchor_ns >= STILL_NS) {
+        } else if (f->belief.t_ns - slot->anchor_ns >= STILL_NS) {
             distance2 += moved2(f, slot, z);
             *old_rows += PLR_ROWS;
         }
@@ -77,12 +77,12 @@ bool plr_standstill_is_seen(plr_filter *f, const plr_frame *frame, unsigned n,
     if (f->config.standstill_sigma_mps <= 0)
         return false;
     if (!is_still(f, frame, n, &old_rows)) {
-        for (unsigned slot = 0; slot < f->count; slot++)
-            f->slots[slot].anchored = 0;
+        for (unsigned slot = 0; slot < f->belief.count; slot++)
+            f->belief.slots[slot].anchored = 0;
         return false;
     }
     memset(reading, 0, sizeof *reading);
-    reading->t_ns = f->t_ns;
+    reading->t_ns = f->belief.t_ns;
     reading->sensor = PLR_SENSOR_STANDSTILL;
     reading->axes = 3;
     reading->sigma[0] = reading->sigma[1] = f->config.standstill_sigma_mps;

@@ -9,21 +9,21 @@
 
 /* A block that the process does not estimate has no rows. */
 static inline bool plr_has_block(const plr_filter *f, plr_block_id block) {
-    return f->layout.block[block].size > 0;
+    return f->belief.layout.block[block].size > 0;
 }
 
 static inline unsigned plr_block_size(const plr_filter *f, plr_block_id block) {
-    return f->layout.block[block].size;
+    return f->belief.layout.block[block].size;
 }
 
 /* The first row of a block. */
 static inline unsigned plr_row_of(const plr_filter *f, plr_block_id block) {
-    return f->layout.block[block].row;
+    return f->belief.layout.block[block].row;
 }
 
 /* Rows of all blocks before the landmarks. */
 static inline unsigned plr_core_dim(const plr_filter *f) {
-    return f->layout.core;
+    return f->belief.layout.core;
 }
 
 #endif

@@ -45,8 +45,7 @@ static const uint8_t part_of[PLR_CALIBRATION_ERRORS] = {
     [PLR_CAMERA_CLOCK] = PLR_CALIBRATE_CLOCK,
 };
 
-void plr_calibration_lay_out(plr_parameters *par, const plr_config *config) {
-    plr_calibrated *to = &par->calibrated;
+void plr_calibration_lay_out(plr_error_columns *to, const plr_config *config) {
     plr_real variance[PLR_CALIBRATION_ERRORS];
     fill_variances(config, variance);
     memset(to, 0, sizeof *to);
@@ -68,7 +67,7 @@ void plr_calibration_lay_out(plr_parameters *par, const plr_config *config) {
 /* The column of the camera's clock, or count. */
 static unsigned column_of_clock(const plr_filter *f) {
     unsigned k = 0;
-    while (k < f->par.calibrated.count && f->par.calibrated.kind[k] != PLR_CAMERA_CLOCK)
+    while (k < f->camera.errors.count && f->camera.errors.kind[k] != PLR_CAMERA_CLOCK)
         k++;
     return k;
 }
@@ -76,12 +75,12 @@ static unsigned column_of_clock(const plr_filter *f) {
 /* By how much later than its stamp a picture was taken, s. */
 static plr_real offset_of_clock(const plr_filter *f) {
     const unsigned clock = column_of_clock(f);
-    return clock < f->par.calibrated.count ? f->calibration.moved[clock] : PLR_R(0);
+    return clock < f->camera.errors.count ? f->camera.estimate.moved[clock] : PLR_R(0);
 }
 
 /* By its clock the camera was elsewhere: q(t + tau) = Exp(-tau u) q(t), u its mean twist over tau. */
 static void place_eye(plr_filter *f) {
-    plr_calibration_estimate *c = &f->calibration;
+    plr_camera_estimate *c = &f->camera.estimate;
     plr_real way[PLR_POSE_DIM], R[9], p[3], turned[3];
     const plr_real tau = offset_of_clock(f);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
@@ -94,13 +93,13 @@ static void place_eye(plr_filter *f) {
 }
 
 void plr_calibration_place(const plr_filter *f, plr_real R[9], plr_real t[3]) {
-    const plr_camera *eye = &f->calibration.eye;
-    plr_mat3_mul(R, eye->R_CB, f->par.camera.R_CB);
-    plr_camera_from_body(t, eye, f->par.camera.t_CB);
+    const plr_camera *eye = &f->camera.estimate.eye;
+    plr_mat3_mul(R, eye->R_CB, f->camera.given.R_CB);
+    plr_camera_from_body(t, eye, f->camera.given.t_CB);
 }
 
 void plr_calibration_forget(plr_filter *f) {
-    plr_calibration_estimate *c = &f->calibration;
+    plr_camera_estimate *c = &f->camera.estimate;
     memset(c->factor, 0, sizeof c->factor);
     memset(c->sum, 0, sizeof c->sum);
     memset(c->sum_variance, 0, sizeof c->sum_variance);
@@ -112,16 +111,16 @@ void plr_calibration_forget(plr_filter *f) {
 }
 
 void plr_calibration_put_back(plr_filter *f) {
-    plr_calibration_estimate *c = &f->calibration;
+    plr_camera_estimate *c = &f->camera.estimate;
     memset(c->moved, 0, sizeof c->moved);
     memset(c->t, 0, sizeof c->t);
-    c->eye = f->par.camera;
+    c->eye = f->camera.given;
     plr_mat3_identity(c->R);
     place_eye(f);
 }
 
 void plr_calibration_reset(plr_filter *f) {
-    memset(&f->calibration, 0, sizeof f->calibration);
+    memset(&f->camera.estimate, 0, sizeof f->camera.estimate);
     plr_calibration_forget(f);
     plr_calibration_put_back(f);
 }
@@ -148,12 +147,12 @@ static plr_real rate_gain(const plr_inertial *s) {
 }
 
 void plr_calibration_note_rate(plr_filter *f, const plr_real w_B[3]) {
-    plr_calibration_estimate *c = &f->calibration;
-    const plr_real gain = rate_gain(&f->inertial), left = PLR_R(1) - gain;
-    const plr_real noise = PLR_R(0.5) * f->inertial.change2[1];
-    if (!f->inertial.started) {
-        memcpy(c->rate, f->inertial.slow + 3, sizeof c->rate);
-        c->rate_variance = noise * PLR_R(2) * f->inertial.usual_s;
+    plr_camera_estimate *c = &f->camera.estimate;
+    const plr_real gain = rate_gain(&f->source.inertial), left = PLR_R(1) - gain;
+    const plr_real noise = PLR_R(0.5) * f->source.inertial.change2[1];
+    if (!f->source.inertial.started) {
+        memcpy(c->rate, f->source.inertial.slow + 3, sizeof c->rate);
+        c->rate_variance = noise * PLR_R(2) * f->source.inertial.usual_s;
         return;
     }
     c->rate_variance = PLR_FMA(gain * gain, noise, left * left * c->rate_variance);
@@ -163,8 +162,8 @@ void plr_calibration_note_rate(plr_filter *f, const plr_real w_B[3]) {
 
 void plr_calibration_note_step(plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                                plr_real seconds) {
-    plr_calibration_estimate *c = &f->calibration;
-    if (column_of_clock(f) == f->par.calibrated.count)
+    plr_camera_estimate *c = &f->camera.estimate;
+    if (column_of_clock(f) == f->camera.errors.count)
         return;
     memmove(c->step + 1, c->step, sizeof c->step - sizeof c->step[0]);
     c->step[0][0] = seconds;
@@ -172,8 +171,8 @@ void plr_calibration_note_step(plr_filter *f, const plr_real reading[PLR_POSE_DI
 }
 
 bool plr_calibration_needs_twist(const plr_filter *f) {
-    return plr_calibration_estimated(&f->par.calibrated) > 0 ||
-           column_of_clock(f) < f->par.calibrated.count;
+    return plr_calibration_estimated(&f->camera.errors) > 0 ||
+           column_of_clock(f) < f->camera.errors.count;
 }
 
 /* x <- 0, and false, unless it is beyond three sigmas, three numbers whose variances add up to that. */
@@ -191,7 +190,7 @@ static void add_mean_rate(const plr_filter *f, plr_real begin, plr_real end, con
     const plr_real each = share / (begin - end);
     plr_real at = 0;
     for (unsigned k = 0; k <= PLR_CLOCK_STEPS && at < begin; k++) {
-        const plr_real *step = k < PLR_CLOCK_STEPS ? f->calibration.step[k] : NULL;
+        const plr_real *step = k < PLR_CLOCK_STEPS ? f->camera.estimate.step[k] : NULL;
         const plr_real *rate = step ? step + 1 : w;
         const plr_real next = step && at + step[0] < begin ? at + step[0] : begin;
         const plr_real seconds = next - (at > end ? at : end);
@@ -225,27 +224,27 @@ void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         variance[i / 3] += P_u[(PLR_POSE_DIM + 1) * i];
     if (imu) {
-        variance[1] = PLR_R(3) * f->calibration.rate_variance;
+        variance[1] = PLR_R(3) * f->camera.estimate.rate_variance;
         for (unsigned i = 0; i < 3; i++)
-            u[3 + i] = f->calibration.rate[i] - f->bias[3 + i];
+            u[3 + i] = f->camera.estimate.rate[i] - f->belief.bias[3 + i];
     }
     const bool goes = demand_motion(u, variance[0]), turns = demand_motion(u + 3, variance[1]);
     for (unsigned i = 0; i < 3; i++)
         mean[i] = goes ? PLR_FMA(PLR_R(0.5) * tau, change[i], u[i]) : PLR_R(0);
-    mean_rate(f, tau, f->calibration.rate, mean + 3);
+    mean_rate(f, tau, f->camera.estimate.rate, mean + 3);
     for (unsigned i = 3; i < PLR_POSE_DIM; i++)
-        mean[i] = turns && imu ? mean[i] - f->bias[i] : u[i];
-    f->calibration.moves = goes || turns || f->config.mode == PLR_MODE_MAPPING;
-    plr_mat6_vec(f->calibration.twist, f->par.Ad_CB, u);
-    plr_mat6_vec(f->calibration.mean_twist, f->par.Ad_CB, mean);
+        mean[i] = turns && imu ? mean[i] - f->belief.bias[i] : u[i];
+    f->camera.estimate.moves = goes || turns || f->config.mode == PLR_MODE_MAPPING;
+    plr_mat6_vec(f->camera.estimate.twist, f->camera.Ad_CB, u);
+    plr_mat6_vec(f->camera.estimate.mean_twist, f->camera.Ad_CB, mean);
     place_eye(f);
 }
 
 void plr_calibration_correct(plr_filter *f, const plr_real *ds) {
-    plr_calibration_estimate *c = &f->calibration;
+    plr_camera_estimate *c = &f->camera.estimate;
     plr_real by[PLR_CALIBRATION_ERRORS] = {0}, turn[9], before[9], t[3];
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
-        const unsigned kind = f->par.calibrated.kind[k];
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++) {
+        const unsigned kind = f->camera.errors.kind[k];
         const bool share = kind == PLR_BASELINE || kind == PLR_FOCAL_LENGTH;
         by[kind] = ds[k];
         c->moved[k] += share ? PLR_FMA(c->moved[k], ds[k], ds[k]) : ds[k];
@@ -269,12 +268,12 @@ void plr_calibration_correct(plr_filter *f, const plr_real *ds) {
 /* ---------------------------------------------------------------- what is told */
 
 static void tell_camera(const plr_filter *f, plr_calibration *told) {
-    const plr_calibration_estimate *c = &f->calibration;
+    const plr_camera_estimate *c = &f->camera.estimate;
     plr_real R[9], body[3], t[3];
-    plr_mat3_mul(R, c->R, f->par.camera.R_CB);
-    plr_mat3_vec(body, f->par.camera.R_CB, f->par.imu_arm);
+    plr_mat3_mul(R, c->R, f->camera.given.R_CB);
+    plr_mat3_vec(body, f->camera.given.R_CB, f->source.imu_arm);
     for (unsigned i = 0; i < 3; i++)
-        body[i] = f->par.camera.t_CB[i] - body[i];
+        body[i] = f->camera.given.t_CB[i] - body[i];
     plr_mat3_vec(t, c->R, body);
     told->fx_px = (double)c->eye.fx;
     told->fy_px = (double)c->eye.fy;
@@ -288,10 +287,10 @@ static void tell_camera(const plr_filter *f, plr_calibration *told) {
 }
 
 void plr_calibration_tell(const plr_filter *f, plr_calibration_result *told) {
-    const plr_calibration_estimate *c = &f->calibration;
-    const plr_calibrated *errors = &f->par.calibrated;
+    const plr_camera_estimate *c = &f->camera.estimate;
+    const plr_error_columns *errors = &f->camera.errors;
     memset(told, 0, sizeof *told);
-    told->t_ns = f->t_ns;
+    told->t_ns = f->belief.t_ns;
     tell_camera(f, &told->camera);
     for (unsigned j = 0; j < errors->count; j++) {
         plr_real variance = 0;

@@ -17,12 +17,12 @@
 
 /* How many errors are estimated. Where a build has room for none the compiler sees that, and leaves out what
  * estimates them. */
-static inline unsigned plr_calibration_estimated(const plr_calibrated *errors) {
+static inline unsigned plr_calibration_estimated(const plr_error_columns *errors) {
     return PLR_MAX_CALIBRATION > 0 ? errors->estimated : 0U;
 }
 
 /* Lays out the columns of S by the settings. */
-void plr_calibration_lay_out(plr_parameters *par, const plr_config *config);
+void plr_calibration_lay_out(plr_error_columns *to, const plr_config *config);
 
 /* The calibration as it was given to init. */
 void plr_calibration_reset(plr_filter *f);

@@ -23,18 +23,18 @@ enum {
 #define LITTLE PLR_R(1e-4)
 
 void plr_calibration_begin(plr_filter *f) {
-    if (plr_calibration_estimated(&f->par.calibrated) > 0)
+    if (plr_calibration_estimated(&f->camera.errors) > 0)
         memset(&f->work.learnt, 0, sizeof f->work.learnt);
 }
 
 void plr_calibration_marginalise(plr_filter *f) {
     plr_learnt *to = &f->work.learnt;
     const plr_noise *noise = &f->work.noise;
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++)
         for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
             const plr_real by = noise->eta_of_S[k][i];
             to->eta[k] = PLR_FMA(by, noise->eta[i], to->eta[k]);
-            for (unsigned l = k; l < f->par.calibrated.count; l++)
+            for (unsigned l = k; l < f->camera.errors.count; l++)
                 to->J[K * k + l] = PLR_FMA(-by, noise->eta_of_S[l][i], to->J[K * k + l]);
         }
 }
@@ -55,7 +55,7 @@ static void add(unsigned n, plr_real a, const plr_real *x, plr_real *y) {
 /* y = J x, J of the estimated errors, x the first `size` of them. */
 static void times_learnt(const plr_filter *f, unsigned size, const plr_real *x, plr_real *y) {
     const plr_real *J = f->work.learnt.J; /* an upper triangle */
-    for (unsigned i = 0; i < plr_calibration_estimated(&f->par.calibrated); i++) {
+    for (unsigned i = 0; i < plr_calibration_estimated(&f->camera.errors); i++) {
         y[i] = 0;
         for (unsigned j = 0; j < size; j++)
             y[i] = PLR_FMA(i < j ? J[K * i + j] : J[K * j + i], x[j], y[i]);
@@ -67,7 +67,7 @@ static void times_learnt(const plr_filter *f, unsigned size, const plr_real *x, 
  * that gives of g_k itself. So nothing is ever inverted, and float32 will do: it is a square root filter
  * (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977). False if J is none. */
 static bool correct_factor(const plr_filter *f, plr_real *G, plr_real *D) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++) {
         plr_real *g = G + K * k, Jg[K];
         times_learnt(f, k + 1, g, Jg);
         plr_real pivot = PLR_R(1) / D[k] + dot(k + 1, g, Jg);
@@ -86,13 +86,13 @@ static bool correct_factor(const plr_filter *f, plr_real *G, plr_real *D) {
 /* x += Sigma y, of the estimated errors. */
 static void add_product(const plr_filter *f, const plr_real *G, const plr_real *D,
                         const plr_real *y, plr_real *x) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++)
         add(k + 1, D[k] * dot(k + 1, G + K * k, y), G + K * k, x);
 }
 
 bool plr_calibration_is_sound(const plr_filter *f) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
-        if (!(f->calibration.told[k] > 0))
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++)
+        if (!(f->camera.estimate.told[k] > 0))
             return false;
     return true;
 }
@@ -100,16 +100,16 @@ bool plr_calibration_is_sound(const plr_filter *f) {
 /* The variance of what a frame says of error k beside its estimate, were all errors white, in sigmas of the
  * prior: J + J Sigma J. */
 static plr_real score_variance(const plr_filter *f, unsigned k) {
-    const plr_calibration_estimate *c = &f->calibration;
+    const plr_camera_estimate *c = &f->camera.estimate;
     const plr_real *J = f->work.learnt.J;
     plr_real sum = J[(K + 1) * k];
-    for (unsigned m = 0; m < plr_calibration_estimated(&f->par.calibrated); m++) {
+    for (unsigned m = 0; m < plr_calibration_estimated(&f->camera.errors); m++) {
         plr_real by = 0;
         for (unsigned j = 0; j <= m; j++)
             by = PLR_FMA(c->factor[K * m + j], j < k ? J[K * j + k] : J[K * k + j], by);
-        sum = PLR_FMA(f->par.calibrated.variance[m] * c->told[m] * by, by, sum);
+        sum = PLR_FMA(f->camera.errors.variance[m] * c->told[m] * by, by, sum);
     }
-    return f->par.calibrated.variance[k] * sum;
+    return f->camera.errors.variance[k] * sum;
 }
 
 /* How much more the scores g of several frames add up to than those of one suggest. Errors that are alike
@@ -117,11 +117,11 @@ static plr_real score_variance(const plr_filter *f, unsigned k) {
  * that much too large: an overdispersion (McCullagh and Nelder, Generalized Linear Models, 1989, 4.5), of
  * a sum because of the correlation. */
 static plr_real note_excess(plr_filter *f) {
-    plr_calibration_estimate *c = &f->calibration;
+    plr_camera_estimate *c = &f->camera.estimate;
     plr_real largest = 1;
     c->usual_frames += 1;
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
-        const plr_real sigma = PLR_SQRT(f->par.calibrated.variance[k]);
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++) {
+        const plr_real sigma = PLR_SQRT(f->camera.errors.variance[k]);
         c->sum[k] = PLR_FMA(KEPT, c->sum[k], sigma * f->work.learnt.eta[k]);
         c->sum_variance[k] = PLR_FMA(KEPT * KEPT, c->sum_variance[k], score_variance(f, k));
         const plr_real ratio = c->sum[k] * c->sum[k] / (c->sum_variance[k] + LITTLE);
@@ -135,11 +135,11 @@ static plr_real note_excess(plr_filter *f) {
 /* What is learnt counts 1/excess of what it says, that of all frames so far too: so as the excess grows,
  * prior and what it was drawn to gain weight beside it. */
 static plr_real weigh_prior(plr_filter *f) {
-    plr_calibration_estimate *c = &f->calibration;
+    plr_camera_estimate *c = &f->camera.estimate;
     plr_learnt *learnt = &f->work.learnt;
     const plr_real excess = f->config.process == PLR_PROCESS_TWIST ? note_excess(f) : c->excess;
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
-        const plr_real more = (excess - c->excess) / f->par.calibrated.variance[k];
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++) {
+        const plr_real more = (excess - c->excess) / f->camera.errors.variance[k];
         learnt->J[(K + 1) * k] += more;
         learnt->eta[k] = PLR_FMA(-more, c->moved[k], learnt->eta[k]);
     }
@@ -149,8 +149,8 @@ static plr_real weigh_prior(plr_filter *f) {
 /* How each error that is considered misleads those that are estimated: -Sigma times the information that
  * they share. */
 static void mislead(plr_filter *f, plr_real *G, const plr_real *D) {
-    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
-    for (unsigned k = n; k < f->par.calibrated.count; k++) {
+    const unsigned n = plr_calibration_estimated(&f->camera.errors);
+    for (unsigned k = n; k < f->camera.errors.count; k++) {
         plr_real less[K];
         times_learnt(f, n, G + K * k, less);
         for (unsigned i = 0; i < n; i++)
@@ -162,7 +162,7 @@ static void mislead(plr_filter *f, plr_real *G, const plr_real *D) {
 /* The variance of error j, of the columns G and D of a factor. */
 static plr_real variance_of(const plr_filter *f, const plr_real *G, const plr_real *D, unsigned j) {
     plr_real variance = 0;
-    for (unsigned k = j; k < plr_calibration_estimated(&f->par.calibrated); k++)
+    for (unsigned k = j; k < plr_calibration_estimated(&f->camera.errors); k++)
         variance = PLR_FMA(G[K * k + j] * G[K * k + j], D[k], variance);
     return variance;
 }
@@ -171,25 +171,25 @@ static plr_real variance_of(const plr_filter *f, const plr_real *G, const plr_re
  * what is left: no farther than that information lets it. Else it is no calibration that the residuals show. */
 static bool may_move(const plr_filter *f, const plr_real *G, const plr_real *D, unsigned k,
                      plr_real excess, plr_real ds) {
-    const plr_real prior = f->par.calibrated.variance[k];
+    const plr_real prior = f->camera.errors.variance[k];
     const plr_real learnt = prior - excess * variance_of(f, G, D, k);
-    const plr_real moved = f->calibration.moved[k] + ds;
+    const plr_real moved = f->camera.estimate.moved[k] + ds;
     return moved * moved <= PLR_R(LEARNT_SIGMAS * LEARNT_SIGMAS) * (learnt + LITTLE * prior);
 }
 
 bool plr_calibration_refuses(const plr_filter *f, unsigned k) {
-    return f->calibration.misfits[k] >= MOST_MISFITS;
+    return f->camera.estimate.misfits[k] >= MOST_MISFITS;
 }
 
 /* The state and the camera as if nothing had been learnt: what was moved is no error of the calibration. A number
  * that is refused is considered from now on, and the others are learnt anew. */
 static void put_back(plr_filter *f) {
-    plr_calibration_estimate *c = &f->calibration;
+    plr_camera_estimate *c = &f->camera.estimate;
     plr_real back[K];
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++)
         back[k] = -c->moved[k];
-    plr_combine_rows(plr_covariance_dim(f), plr_calibration_estimated(&f->par.calibrated), back, 1,
-                     f->S[0], PLR_MAX_LD, f->work.dx);
+    plr_combine_rows(plr_covariance_dim(f), plr_calibration_estimated(&f->camera.errors), back, 1,
+                     f->belief.S[0], PLR_MAX_LD, f->work.dx);
     plr_calibration_forget(f);
     plr_calibration_put_back(f);
 }
@@ -197,10 +197,10 @@ static void put_back(plr_filter *f) {
 /* True if no number moves farther than it may; else this frame teaches nothing. */
 static bool may_all_move(plr_filter *f, const plr_real *G, const plr_real *D, plr_real excess,
                          const plr_real *ds) {
-    plr_calibration_estimate *c = &f->calibration;
-    const plr_real *prior = f->par.calibrated.variance;
+    plr_camera_estimate *c = &f->camera.estimate;
+    const plr_real *prior = f->camera.errors.variance;
     bool may = true, refused = false;
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++) {
         if (!(ds[k] * ds[k] < PLR_R(MOST_SIGMAS * MOST_SIGMAS) * prior[k]))
             return false;
         if (may_move(f, G, D, k, excess, ds[k]))
@@ -217,7 +217,7 @@ static bool may_all_move(plr_filter *f, const plr_real *G, const plr_real *D, pl
 /* A number that is refused is told nothing. */
 static void leave_out_refused(plr_filter *f) {
     plr_learnt *learnt = &f->work.learnt;
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++) {
         if (!plr_calibration_refuses(f, k))
             continue;
         learnt->eta[k] = 0;
@@ -227,8 +227,8 @@ static void leave_out_refused(plr_filter *f) {
 }
 
 void plr_calibration_learn(plr_filter *f) {
-    plr_calibration_estimate *c = &f->calibration;
-    const plr_calibrated *errors = &f->par.calibrated;
+    plr_camera_estimate *c = &f->camera.estimate;
+    const plr_error_columns *errors = &f->camera.errors;
     const unsigned n = plr_calibration_estimated(errors);
     plr_real G[K * K], D[K], ds[K] = {0};
     if (n == 0 || !c->moves)
@@ -248,12 +248,12 @@ void plr_calibration_learn(plr_filter *f) {
     for (unsigned k = 0; k < n; k++)
         c->told[k] = excess * D[k] / errors->variance[k];
     c->excess = excess;
-    plr_combine_rows(plr_covariance_dim(f), n, ds, 1, f->S[0], PLR_MAX_LD, f->work.dx);
+    plr_combine_rows(plr_covariance_dim(f), n, ds, 1, f->belief.S[0], PLR_MAX_LD, f->work.dx);
     plr_calibration_correct(f, ds);
 }
 
 bool plr_calibration_is_off(const plr_filter *f) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->camera.errors); k++)
         if (plr_calibration_refuses(f, k))
             return true;
     return false;

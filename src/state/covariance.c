@@ -14,7 +14,7 @@ unsigned plr_covariance_row(const plr_filter *f, unsigned slot) {
 }
 
 unsigned plr_covariance_dim(const plr_filter *f) {
-    return plr_covariance_row(f, f->count);
+    return plr_covariance_row(f, f->belief.count);
 }
 
 unsigned plr_covariance_ld(const plr_filter *f) {
@@ -33,9 +33,9 @@ PLR_SELDOM void plr_covariance_begin(plr_filter *f, plr_block_id block, const do
         for (unsigned j = 0; j <= i; j++) {
             const bool own_row = i < row + size, own_column = j >= row && j < row + size;
             if (own_row && own_column)
-                f->P[plr_packed_row(i) + j] = (plr_real)P_own[(i - row) * size + j - row];
+                f->belief.P[plr_packed_row(i) + j] = (plr_real)P_own[(i - row) * size + j - row];
             else if (own_row || own_column)
-                f->P[plr_packed_row(i) + j] = 0;
+                f->belief.P[plr_packed_row(i) + j] = 0;
         }
 }
 
@@ -52,7 +52,7 @@ PLR_SELDOM void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_i
     PLR_ASSERT(plr_row_of(f, rows) > plr_row_of(f, columns));
     for (unsigned i = 0; i < plr_block_size(f, rows); i++)
         for (unsigned j = 0; j < plr_block_size(f, columns); j++)
-            f->P[plr_packed_at(plr_row_of(f, rows) + i, plr_row_of(f, columns) + j)] =
+            f->belief.P[plr_packed_at(plr_row_of(f, rows) + i, plr_row_of(f, columns) + j)] =
                 P[plr_block_size(f, columns) * i + j];
 }
 
@@ -70,11 +70,11 @@ PLR_SELDOM bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_D
     for (unsigned i = PLR_POSE_DIM; i < n; i++) {
         g[i] = 0;
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-            g[i] = PLR_FMA(f->P[plr_packed_row(i) + k], y[k], g[i]);
+            g[i] = PLR_FMA(f->belief.P[plr_packed_row(i) + k], y[k], g[i]);
     }
     for (unsigned i = 0; i < n; i++)
         for (unsigned j = 0; j <= i; j++) {
-            plr_real *own = &f->P[plr_packed_row(i) + j];
+            plr_real *own = &f->belief.P[plr_packed_row(i) + j];
             *own = PLR_FMA(g[i], g[j], *own);
         }
     return true;
@@ -85,8 +85,8 @@ PLR_SELDOM void plr_covariance_forget(plr_filter *f, plr_block_id block, const p
     plr_sensitivity_clear(f, row, plr_block_size(f, block));
     for (unsigned i = row; i < row + plr_block_size(f, block); i++) {
         for (unsigned j = 0; j < n; j++)
-            f->P[plr_packed_at(i, j)] = 0;
-        f->P[plr_packed_at(i, i)] = variance[i - row];
+            f->belief.P[plr_packed_at(i, j)] = 0;
+        f->belief.P[plr_packed_at(i, i)] = variance[i - row];
     }
 }
 
@@ -94,20 +94,20 @@ void plr_covariance_add(plr_filter *f, plr_block_id block, const plr_real *C) {
     const unsigned row = plr_row_of(f, block), size = plr_block_size(f, block);
     for (unsigned i = 0; i < size; i++)
         for (unsigned j = 0; j <= i; j++)
-            f->P[plr_packed_at(row + i, row + j)] += C[size * i + j];
+            f->belief.P[plr_packed_at(row + i, row + j)] += C[size * i + j];
 }
 
 void plr_covariance_add_variance(plr_filter *f, plr_block_id block, const plr_real *variance) {
     const unsigned row = plr_row_of(f, block);
     for (unsigned i = row; i < row + plr_block_size(f, block); i++)
-        f->P[plr_packed_at(i, i)] += variance[i - row];
+        f->belief.P[plr_packed_at(i, i)] += variance[i - row];
 }
 
 void plr_covariance_add_to_landmark(plr_filter *f, unsigned slot, const plr_real C[9]) {
     const unsigned row = plr_covariance_row(f, slot);
     for (unsigned i = 0; i < PLR_LANDMARK_DIM; i++)
         for (unsigned j = 0; j <= i; j++)
-            f->P[plr_packed_at(row + i, row + j)] += C[PLR_LANDMARK_DIM * i + j];
+            f->belief.P[plr_packed_at(row + i, row + j)] += C[PLR_LANDMARK_DIM * i + j];
 }
 
 void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id columns, plr_real *P) {
@@ -116,7 +116,7 @@ void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id col
 }
 
 void plr_covariance_with_drivers(const plr_filter *f, unsigned row, unsigned rows, plr_real *P) {
-    plr_get_block(f, row, rows, f->layout.driver, f->layout.drivers, P);
+    plr_get_block(f, row, rows, f->belief.layout.driver, f->belief.layout.drivers, P);
 }
 
 void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]) {
@@ -126,7 +126,7 @@ void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9
 
 plr_real plr_covariance_of_range(const plr_filter *f, unsigned slot) {
     const unsigned row = plr_covariance_row(f, slot) + 2;
-    return f->P[plr_packed_at(row, row)];
+    return f->belief.P[plr_packed_at(row, row)];
 }
 
 size_t plr_covariance_size(const plr_filter *f, unsigned landmarks) {
@@ -134,21 +134,21 @@ size_t plr_covariance_size(const plr_filter *f, unsigned landmarks) {
 }
 
 const plr_real *plr_covariance_elements(const plr_filter *f) {
-    return f->P;
+    return f->belief.P;
 }
 
 double plr_covariance_trace(const plr_filter *f) {
     const unsigned n = plr_covariance_dim(f);
     double trace = 0;
     for (unsigned i = 0; i < n; i++)
-        trace += (double)f->P[plr_packed_row(i) + i];
+        trace += (double)f->belief.P[plr_packed_row(i) + i];
     return trace;
 }
 
 bool plr_covariance_is_positive(const plr_filter *f) {
     const unsigned n = plr_covariance_dim(f);
     for (unsigned i = 0; i < n; i++) {
-        const plr_real variance = f->P[plr_packed_row(i) + i];
+        const plr_real variance = f->belief.P[plr_packed_row(i) + i];
         if (!(variance >= 0) || !plr_is_finite(variance))
             return false;
     }
@@ -160,7 +160,7 @@ bool plr_covariance_is_positive(const plr_filter *f) {
 PLR_SELDOM void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {
     const unsigned s = plr_covariance_dim(f);
     for (unsigned i = 0; i < 3; i++)
-        memset(f->P + plr_packed_row(s + i), 0, (s + i + 1) * sizeof *f->P);
+        memset(f->belief.P + plr_packed_row(s + i), 0, (s + i + 1) * sizeof *f->belief.P);
     plr_real own[9];
     memcpy(own, landmark->P, sizeof own);
     if (landmark->uses_pose) {
@@ -169,9 +169,9 @@ PLR_SELDOM void plr_covariance_append(plr_filter *f, const plr_new_landmark *lan
         for (unsigned i = 0; i < 3; i++)
             for (unsigned c = 0; c < PLR_POSE_DIM; c++)
                 plr_add_column(f, s, pose + c, J[PLR_POSE_DIM * i + c],
-                               f->P + plr_packed_row(s + i));
+                               f->belief.P + plr_packed_row(s + i));
         for (unsigned i = 0; i < 3; i++)
-            plr_gemm_nt(1, 3, PLR_POSE_DIM, f->P + plr_packed_row(s + i), PLR_POSE_DIM, J,
+            plr_gemm_nt(1, 3, PLR_POSE_DIM, f->belief.P + plr_packed_row(s + i), PLR_POSE_DIM, J,
                         PLR_POSE_DIM, own + 3 * i, 3);
     }
     plr_set_block(f, s, 3, s, 3, own);
@@ -180,16 +180,17 @@ PLR_SELDOM void plr_covariance_append(plr_filter *f, const plr_new_landmark *lan
 
 PLR_SELDOM void plr_covariance_remove(plr_filter *f, unsigned slot) {
     const unsigned to = plr_covariance_row(f, slot);
-    const unsigned from = plr_covariance_row(f, f->count - 1);
+    const unsigned from = plr_covariance_row(f, f->belief.count - 1);
     if (to == from)
         return;
     plr_sensitivity_remove(f, to, from);
     plr_real own[9];
     plr_get_block(f, from, 3, from, 3, own);
     for (unsigned i = 0; i < 3; i++)
-        memcpy(f->P + plr_packed_row(to + i), f->P + plr_packed_row(from + i), to * sizeof *f->P);
+        memcpy(f->belief.P + plr_packed_row(to + i), f->belief.P + plr_packed_row(from + i),
+               to * sizeof *f->belief.P);
     plr_set_block(f, to, 3, to, 3, own);
     for (unsigned i = to + 3; i < from; i++)
         for (unsigned c = 0; c < 3; c++)
-            f->P[plr_packed_row(i) + to + c] = f->P[plr_packed_row(from + c) + i];
+            f->belief.P[plr_packed_row(i) + to + c] = f->belief.P[plr_packed_row(from + c) + i];
 }

@@ -126,7 +126,7 @@ void plr_covariance_make_up_for_rounding(plr_filter *f);
 
 /* --- slots --- */
 
-/* Appends the rows of slot f->count (not yet counted): error = J_pose xi + N(0, landmark->P). */
+/* Appends the rows of slot f->belief.count (not yet counted): error = J_pose xi + N(0, landmark->P). */
 void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark);
 
 /* Moves the rows of the last slot into those of `slot`. */

@@ -34,8 +34,9 @@ static inline void three_rows_by_six(unsigned m, const plr_real *const X[PLR_ROW
 
 /* The pose's columns of three rows of P, from row i on: X <- X A^T, with At = A^T. */
 static void turn_pose_columns(plr_filter *f, unsigned i, const plr_real At[PLR_POSE_SQUARE]) {
-    plr_real *const row[PLR_ROWS] = {f->P + plr_packed_row(i), f->P + plr_packed_row(i + 1),
-                                     f->P + plr_packed_row(i + 2)};
+    plr_real *const row[PLR_ROWS] = {f->belief.P + plr_packed_row(i),
+                                     f->belief.P + plr_packed_row(i + 1),
+                                     f->belief.P + plr_packed_row(i + 2)};
     const plr_real *const X[PLR_ROWS] = {row[0], row[1], row[2]};
     three_rows_by_six(PLR_POSE_DIM, X, At, row);
 }
@@ -68,9 +69,9 @@ typedef struct plr_landmark_factors {
 static void transport_landmark(plr_filter *f, unsigned slot, const plr_real At[PLR_POSE_SQUARE],
                                const plr_landmark_factors *by) {
     const unsigned s = plr_covariance_row(f, slot), first = plr_core_dim(f);
-    plr_real *r0 = f->P + plr_packed_row(s);
-    plr_real *r1 = f->P + plr_packed_row(s + 1);
-    plr_real *r2 = f->P + plr_packed_row(s + 2);
+    plr_real *r0 = f->belief.P + plr_packed_row(s);
+    plr_real *r1 = f->belief.P + plr_packed_row(s + 1);
+    plr_real *r2 = f->belief.P + plr_packed_row(s + 2);
     plr_real *const others[PLR_ROWS] = {r0 + first, r1 + first, r2 + first};
     const plr_real *own = by->F + 9 * slot;
 
@@ -108,11 +109,11 @@ void plr_covariance_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]) 
 void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F) {
     plr_real At[PLR_POSE_SQUARE];
     turn_pose(f, plr_core_dim(f), A, At);
-    const plr_landmark_factors by = {F, f->work.Vt + 9 * f->count,
-                                     f->work.Vt + (9 + PLR_WIDE_FACTOR) * f->count};
+    const plr_landmark_factors by = {F, f->work.Vt + 9 * f->belief.count,
+                                     f->work.Vt + (9 + PLR_WIDE_FACTOR) * f->belief.count};
     if (WIDE_REGISTERS)
-        plr_blocks3_widen(f->count, F, by.Gt);
-    for (unsigned slot = 0; slot < f->count; slot++)
+        plr_blocks3_widen(f->belief.count, F, by.Gt);
+    for (unsigned slot = 0; slot < f->belief.count; slot++)
         transport_landmark(f, slot, At, &by);
     plr_sensitivity_turn_landmarks(f, F);
 }
@@ -120,12 +121,12 @@ void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], 
 void plr_covariance_motion_share(const plr_filter *f, unsigned row,
                                  const plr_real Kt[PLR_MOTION_BY],
                                  plr_real V[PLR_ROWS * PLR_POSE_DIM]) {
-    const unsigned first = f->layout.driver, drivers = f->layout.drivers;
+    const unsigned first = f->belief.layout.driver, drivers = f->belief.layout.drivers;
     plr_real before[PLR_ROWS * PLR_DRIVERS];
     const plr_real *X[PLR_ROWS];
     plr_real *const out[PLR_ROWS] = {V, V + PLR_POSE_DIM, V + 2 * PLR_POSE_DIM};
     for (unsigned r = 0; r < PLR_ROWS; r++)
-        X[r] = f->P + plr_packed_row(row + r) + first;
+        X[r] = f->belief.P + plr_packed_row(row + r) + first;
     if (row < first + drivers) { /* a part of it is above the diagonal */
         plr_covariance_with_drivers(f, row, PLR_ROWS, before);
         for (unsigned r = 0; r < PLR_ROWS; r++)
@@ -138,7 +139,7 @@ void plr_covariance_motion_share(const plr_filter *f, unsigned row,
  * becomes that by the drivers after the pose's transport: theta is turned. */
 static void drivers_after_motion(const plr_filter *f, const plr_real E[9], unsigned rows,
                                  plr_real *X) {
-    if (f->layout.driver >= PLR_POSE_DIM)
+    if (f->belief.layout.driver >= PLR_POSE_DIM)
         return;
     for (unsigned r = 0; r < rows; r++, X += PLR_DRIVERS) {
         plr_real turned[3];
@@ -151,44 +152,44 @@ static void drivers_after_motion(const plr_filter *f, const plr_real E[9], unsig
 /* After the motion: v <- V x_d + noise, b <- b + noise, V by the drivers as they stand in P. */
 static void carry_core_covariance(plr_filter *f, const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS]) {
     enum { D = PLR_DRIVERS, C = PLR_VELOCITY_DIM };
-    const plr_core_motion *m = &f->core_motion;
-    const unsigned n = plr_covariance_dim(f), first = f->layout.driver;
+    const plr_core_motion *m = &f->motion.core;
+    const unsigned n = plr_covariance_dim(f), first = f->belief.layout.driver;
     const unsigned velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
     plr_real P_xd[PLR_CORE_DIM * D], VP[C * PLR_CORE_DIM] = {0}, P_vv[C * C] = {0};
     plr_covariance_with_drivers(f, 0, PLR_CORE_DIM, P_xd);
     plr_gemm_nt(C, PLR_CORE_DIM, D, V, D, P_xd, D, VP, PLR_CORE_DIM);
     plr_gemm_nt(C, C, D, VP + first, PLR_CORE_DIM, V, D, P_vv, C);
     for (unsigned i = plr_core_dim(f); i < n; i++) { /* the rows of landmarks */
-        plr_real *P_id = f->P + plr_packed_row(i) + first, v[C] = {0};
+        plr_real *P_id = f->belief.P + plr_packed_row(i) + first, v[C] = {0};
         plr_gemm_nn(C, 1, D, V, D, P_id, 1, v, 1);
         memcpy(P_id + (velocity - first), v, sizeof v);
     }
     for (unsigned r = 0; r < C; r++) {
         for (unsigned i = 0; i < PLR_CORE_DIM; i++)
-            f->P[plr_packed_at(velocity + r, i)] = VP[r * PLR_CORE_DIM + i];
+            f->belief.P[plr_packed_at(velocity + r, i)] = VP[r * PLR_CORE_DIM + i];
         for (unsigned c = 0; c <= r; c++)
-            f->P[plr_packed_at(velocity + r, velocity + c)] = P_vv[C * r + c];
+            f->belief.P[plr_packed_at(velocity + r, velocity + c)] = P_vv[C * r + c];
     }
     PLR_ASSERT(plr_row_of(f, PLR_BLOCK_BIAS) == velocity + C);
     for (unsigned r = 0; r < PLR_REST_DIM; r++)
         for (unsigned c = 0; c <= r; c++)
-            f->P[plr_packed_at(velocity + r, velocity + c)] += m->Q_cc[PLR_REST_DIM * r + c];
+            f->belief.P[plr_packed_at(velocity + r, velocity + c)] += m->Q_cc[PLR_REST_DIM * r + c];
 }
 
 void plr_covariance_carry_core(plr_filter *f) {
     if (!plr_has_block(f, PLR_BLOCK_VELOCITY))
         return;
-    carry_core_covariance(f, f->core_motion.V);
-    plr_sensitivity_carry_velocity(f, f->core_motion.V);
+    carry_core_covariance(f, f->motion.core.V);
+    plr_sensitivity_carry_velocity(f, f->motion.core.V);
 }
 
 /* The same but for S; and in Vt of velocity and biases, whose noise goes with the motion's. */
 static void carry_core(plr_filter *f, const plr_applied_motion *motion,
                        const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], plr_real *Vt, size_t ld) {
-    const unsigned first = f->layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
+    const unsigned first = f->belief.layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
     plr_real X[PLR_POSE_DIM * PLR_REST_DIM];
     carry_core_covariance(f, V);
-    memcpy(X, f->core_motion.Q_nc, sizeof X);
+    memcpy(X, f->motion.core.Q_nc, sizeof X);
     plr_motion_solve(motion->L, PLR_REST_DIM, X, PLR_REST_DIM);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real *row = Vt + k * ld, v[PLR_VELOCITY_DIM] = {0};
@@ -206,7 +207,7 @@ static void make_up_for_rounding(plr_filter *f, unsigned first, unsigned end, co
         plr_real moved = 0;
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             moved = PLR_FMA(Vt[k * ld + i], Vt[k * ld + i], moved);
-        f->P[plr_packed_row(i) + i] += PLR_R(8) * PLR_EPSILON * moved;
+        f->belief.P[plr_packed_row(i) + i] += PLR_R(8) * PLR_EPSILON * moved;
     }
 }
 
@@ -221,7 +222,7 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
     }
     memset(noise->eta_of_S, 0, sizeof noise->eta_of_S);
     noise->open = 1;
-    if (f->layout.drivers == 0)
+    if (f->belief.layout.drivers == 0)
         return;
     const bool carries = plr_has_block(f, PLR_BLOCK_VELOCITY);
     plr_real *Vt = f->work.Vt, K[PLR_MOTION_BY], Kt[PLR_MOTION_BY],
@@ -232,7 +233,7 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
     drivers_after_motion(f, motion->E, PLR_POSE_DIM, K);
     plr_motion_transpose(K, Kt);
     if (carries) {
-        memcpy(V, f->core_motion.V, sizeof V);
+        memcpy(V, f->motion.core.V, sizeof V);
         drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, V);
     }
     plr_sensitivity_move(f, K, carries ? V : NULL, noise->Wt, ld);
@@ -251,7 +252,7 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
             noise->Wt[k * ld + i] += v;
             f->work.dx[i] = PLR_FMA(v, motion->z[k], f->work.dx[i]);
         }
-    plr_packed_subtract(n, PLR_POSE_DIM, Vt, Vt, ld, f->P);
+    plr_packed_subtract(n, PLR_POSE_DIM, Vt, Vt, ld, f->belief.P);
     if (carries)
         make_up_for_rounding(f, plr_row_of(f, PLR_BLOCK_VELOCITY), plr_core_dim(f), Vt, ld);
 }
@@ -274,7 +275,7 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     plr_calibration_marginalise(f);
     for (unsigned i = 0; i < PLR_POSE_DIM * ld; i++)
         minus[i] = -Xt[i];
-    plr_packed_subtract(n, PLR_POSE_DIM, minus, Xt, ld, f->P);
+    plr_packed_subtract(n, PLR_POSE_DIM, minus, Xt, ld, f->belief.P);
     make_up_for_rounding(f, plr_core_dim(f), n, Xt, ld);
     if (nu) {
         plr_solve_upper(PLR_POSE_DIM, noise->Lambda, noise->eta);
@@ -286,8 +287,8 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
 PLR_SELDOM void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],
                                             const plr_real B[PLR_MOTION_BY],
                                             const plr_real M[PLR_POSE_SQUARE]) {
-    const unsigned n = plr_covariance_dim(f), drivers = f->layout.drivers;
-    PLR_ASSERT(drivers == 0 || f->layout.driver >= PLR_POSE_DIM);
+    const unsigned n = plr_covariance_dim(f), drivers = f->belief.layout.drivers;
+    PLR_ASSERT(drivers == 0 || f->belief.layout.driver >= PLR_POSE_DIM);
     plr_real P_xi[PLR_POSE_SQUARE], turned[PLR_POSE_SQUARE];
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
     plr_sandwich6(turned, A, P_xi);
@@ -318,6 +319,6 @@ PLR_SELDOM void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_
         turn_pose_columns(f, i, At);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             plr_gemm_nt(1, PLR_POSE_DIM, drivers, P_id + drivers * r, PLR_DRIVERS, B, PLR_DRIVERS,
-                        f->P + plr_packed_row(i + r), PLR_POSE_DIM);
+                        f->belief.P + plr_packed_row(i + r), PLR_POSE_DIM);
     }
 }

@@ -61,7 +61,7 @@ static inline void project_columns(unsigned first, unsigned n, const plr_real H[
 /* rows[r][i] = sum_c H[r][c] P(i, s + c): one pass over P, three columns at a time. */
 static void project_landmark(const plr_filter *f, unsigned n, unsigned s, const plr_real H[9],
                              plr_real *rows, size_t ld) {
-    const plr_real *P = f->P;
+    const plr_real *P = f->belief.P;
     plr_real *out0 = rows, *out1 = rows + ld, *out2 = rows + 2 * ld;
     plr_real own[9];
     plr_rows3_from_left(s, H, P + plr_packed_row(s), P + plr_packed_row(s + 1),
@@ -94,25 +94,26 @@ bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
     plr_real after[PLR_TILE_COLUMNS];
     for (unsigned i = 0; i < n;) {
         const unsigned end =
-            i + plr_packed_subtracted_diagonal(i, n, depth, f->work.Vt, ld, f->P, after);
+            i + plr_packed_subtracted_diagonal(i, n, depth, f->work.Vt, ld, f->belief.P, after);
         for (const plr_real *variance = after; i < end; i++, variance++) {
-            const plr_real before = f->P[plr_packed_row(i) + i];
+            const plr_real before = f->belief.P[plr_packed_row(i) + i];
             const bool stays_zero = before <= 0 && before >= 0 && *variance <= 0 && *variance >= 0;
             if (!(*variance > 0) && !stays_zero)
                 return false;
         }
     }
-    plr_packed_subtract(n, depth, f->work.Vt, f->work.Vt, ld, f->P);
+    plr_packed_subtract(n, depth, f->work.Vt, f->work.Vt, ld, f->belief.P);
     return true;
 }
 
 void plr_covariance_make_up_for_rounding(plr_filter *f) {
     const plr_real seen = PLR_R(8) * PLR_EPSILON, unseen = PLR_EPSILON;
-    for (unsigned slot = 0; slot < f->count; slot++) {
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
         const unsigned row = plr_covariance_row(f, slot);
-        const plr_real share = f->slots[slot].last_frame == f->frame_number ? seen : unseen;
+        const plr_real share =
+            f->belief.slots[slot].last_frame == f->belief.frame_number ? seen : unseen;
         for (unsigned i = row; i < row + 3; i++) {
-            plr_real *variance = &f->P[plr_packed_row(i) + i];
+            plr_real *variance = &f->belief.P[plr_packed_row(i) + i];
             *variance = PLR_FMA(share, *variance, *variance);
         }
     }

@@ -11,7 +11,7 @@ static inline void plr_get_block(const plr_filter *f, unsigned row, unsigned row
                                  unsigned columns, plr_real *B) {
     for (unsigned i = 0; i < rows; i++) {
         const unsigned r = row + i;
-        const plr_real *at = f->P + plr_packed_at(r, column);
+        const plr_real *at = f->belief.P + plr_packed_at(r, column);
         for (unsigned c = column; c < column + columns; c++) {
             *B++ = *at;
             at += c < r ? 1 : c + 1; /* along row r, then down column r */
@@ -25,13 +25,13 @@ static inline void plr_set_block(plr_filter *f, unsigned row, unsigned rows, uns
     for (unsigned i = 0; i < rows; i++)
         for (unsigned j = 0; j < columns; j++)
             if (row + i >= column + j)
-                f->P[plr_packed_row(row + i) + column + j] = B[i * columns + j];
+                f->belief.P[plr_packed_row(row + i) + column + j] = B[i * columns + j];
 }
 
 /* out[i] += a P(i, column) for all rows i, on either side of the diagonal. */
 static inline void plr_add_column(const plr_filter *f, unsigned n, unsigned column, plr_real a,
                                   plr_real *restrict out) {
-    const plr_real *restrict row = f->P + plr_packed_row(column);
+    const plr_real *restrict row = f->belief.P + plr_packed_row(column);
     for (unsigned i = 0; i < column; i++)
         out[i] = PLR_FMA(a, row[i], out[i]);
     const plr_real *x = row + column;

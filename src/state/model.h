@@ -75,7 +75,7 @@ extern const struct plr_model plr_model_world;
 
 /* The model is stored as a number: a damaged address would be followed before any checksum. */
 static inline const struct plr_model *plr_model_of(const plr_filter *f) {
-    return f->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
+    return f->belief.model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
 }
 
 #endif

@@ -48,11 +48,11 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
         plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
         for (int j = 0; j < 3; j++)
             way[j] = -n[j] * inverse;
-        times_adjoint(J + PLR_POSE_DIM * row, way, turn, f->par.Ad_CB);
+        times_adjoint(J + PLR_POSE_DIM * row, way, turn, f->camera.Ad_CB);
     }
     for (int j = 0; j < 3; j++)
         way[j] = chart->mu[j] * inverse * inverse;
-    times_adjoint(J + 2 * PLR_POSE_DIM, way, NULL, f->par.Ad_CB);
+    times_adjoint(J + 2 * PLR_POSE_DIM, way, NULL, f->camera.Ad_CB);
 }
 
 /* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): the derivative of the chart at q+ by the chart
@@ -97,11 +97,11 @@ static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *
                (first - PLR_POSE_DIM) * sizeof *Wt); /* a motion changes no bias */
         memset(Wt + k * ld + n, 0, (ld - n) * sizeof *Wt);
     }
-    for (unsigned slot = 0; slot < f->count; slot++) {
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
         const unsigned row = plr_covariance_row(f, slot);
         plr_polar chart;
         plr_real G[PLR_ROWS * PLR_POSE_DIM], GL[PLR_ROWS * PLR_POSE_DIM] = {0};
-        plr_polar_at(&chart, f->slots[slot].x);
+        plr_polar_at(&chart, f->belief.slots[slot].x);
         chart_by_body_twist(f, &chart, G);
         plr_gemm_nn(3, PLR_POSE_DIM, PLR_POSE_DIM, G, PLR_POSE_DIM, JL, PLR_POSE_DIM, GL,
                     PLR_POSE_DIM);
@@ -114,11 +114,11 @@ static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *
 /* Moves a landmark along its ray to its linearisation point (filter/linearisation.h). The estimate does
  * not change: returns the estimated inverse range minus that of the point, 1/m. */
 static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
-    plr_slot *s = &f->slots[slot];
+    plr_slot *s = &f->belief.slots[slot];
     const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
     const plr_real wanted = s->beyond + f->work.noise.range_shift[slot];
     plr_real ratio = PLR_FMA(wanted, range, PLR_R(1)); /* of inverse ranges */
-    const plr_real farthest = f->par.min_inverse_range * range;
+    const plr_real farthest = f->camera.min_inverse_range * range;
     ratio = ratio < farthest ? farthest : ratio > nearest ? nearest : ratio;
     const plr_real step = (PLR_R(1) - ratio) / ratio;
     for (int i = 0; i < 3; i++)
@@ -128,8 +128,8 @@ static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
 }
 
 static bool body_look(const plr_filter *f, unsigned slot, plr_view *view) {
-    memcpy(view->q, f->slots[slot].x, sizeof view->q);
-    return view->q[2] >= f->par.min_depth;
+    memcpy(view->q, f->belief.slots[slot].x, sizeof view->q);
+    return view->q[2] >= f->camera.min_depth;
 }
 
 /* H = Dz Ji(q), Ji = [r N | -r q]. */
@@ -143,7 +143,7 @@ static void body_derive(const plr_filter *f, unsigned slot, const plr_view *view
         for (int column = 0; column < 2; column++)
             h[column] = chart.r * plr_dot3(Dz + 3 * row, chart.N[column]);
         h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
-        z[row] = PLR_FMA(h[2], f->slots[slot].beyond, z[row]);
+        z[row] = PLR_FMA(h[2], f->belief.slots[slot].beyond, z[row]);
     }
 }
 
@@ -194,10 +194,10 @@ static PLR_SELDOM bool body_adopt(const plr_filter *f, const plr_landmark *known
     for (int i = 0; i < 3; i++)
         offset_W[i] = (plr_real)(known->p_W_m[i] - p_WB[i]);
     plr_mat3_tvec(s_B, R_WB, offset_W);
-    plr_camera_from_body(landmark->x, &f->par.camera, s_B);
+    plr_camera_from_body(landmark->x, &f->camera.given, s_B);
     const plr_real range2 = plr_dot3(landmark->x, landmark->x);
     if (!(range2 > PLR_MIN_RANGE * PLR_MIN_RANGE) ||
-        !(range2 * f->par.min_inverse_range * f->par.min_inverse_range < 1))
+        !(range2 * f->camera.min_inverse_range * f->camera.min_inverse_range < 1))
         return false;
 
     plr_polar chart;
@@ -207,7 +207,7 @@ static PLR_SELDOM bool body_adopt(const plr_filter *f, const plr_landmark *known
     landmark->uses_pose = true;
     memset(landmark->by_calibration, 0, sizeof landmark->by_calibration);
     plr_polar_from_point(Jw, &chart);
-    plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, R_WB);
+    plr_mat3_mul_nt(R_CW, f->camera.given.R_CB, R_WB);
     plr_mat3_mul(J_W, Jw, R_CW);
     return covariance_in_chart(landmark->P, J_W, known->P_W_m2);
 }
@@ -224,7 +224,8 @@ enum { IN_SIGHT, OUT_OF_SIGHT, SIGHTS };
 
 static unsigned sight_of(const plr_filter *f, unsigned slot) {
     const bool parted = plr_has_block(f, PLR_BLOCK_VELOCITY);
-    return parted && f->slots[slot].last_frame != f->frame_number ? OUT_OF_SIGHT : IN_SIGHT;
+    return parted && f->belief.slots[slot].last_frame != f->belief.frame_number ? OUT_OF_SIGHT
+                                                                                : IN_SIGHT;
 }
 
 /* The rigid motions eta of the body that the landmarks' corrections have in common. They differ
@@ -236,16 +237,16 @@ static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_rea
                                 plr_common_motion common[SIGHTS]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
     const bool parted = plr_has_block(f, PLR_BLOCK_VELOCITY);
-    const plr_real baseline = f->par.camera.baseline;
+    const plr_real baseline = f->camera.given.baseline;
     const plr_real W[3] = {1, 1, baseline * baseline};
-    const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
+    const plr_real angle2 = f->camera.pixel_variance / (f->camera.given.fx * f->camera.given.fx);
     plr_rigid_fit fit[SIGHTS];
     memset(fit, 0, sizeof fit);
-    for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
+    for (unsigned slot = 0; slot < f->belief.count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         plr_polar chart;
-        plr_polar_at(&chart, f->slots[slot].x);
+        plr_polar_at(&chart, f->belief.slots[slot].x);
         chart_by_body_twist(f, &chart, J);
-        if (!f->slots[slot].known)
+        if (!f->belief.slots[slot].known)
             plr_rigid_fit_add(&fit[sight_of(f, slot)], J, dx + plr_covariance_row(f, slot), W);
     }
     for (unsigned sight = 0; sight < (parted ? SIGHTS : 1); sight++) {
@@ -253,7 +254,7 @@ static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_rea
         plr_real eta_C[PLR_POSE_DIM];
         plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : dx,
                             f->work.noise.motion_variance, angle2, m->eta);
-        plr_mat6_vec(eta_C, f->par.Ad_CB, m->eta);
+        plr_mat6_vec(eta_C, f->camera.Ad_CB, m->eta);
         plr_se3_expm1(m->E, m->p, eta_C);
         plr_se3_rotation(m->R, m->E);
     }
@@ -280,13 +281,14 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     plr_common_motion both[SIGHTS];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
-    plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot; Vt has at least 72 */
+    plr_real *F = f->work.Vt,
+             *J = F + 9 * f->belief.count; /* 27 numbers a slot; Vt has at least 72 */
     find_common_motions(f, dx, J, both);
 
     unsigned cut = 0;
-    for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
+    for (unsigned slot = 0; slot < f->belief.count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         const plr_common_motion *common = &both[sight_of(f, slot)];
-        plr_slot *s = &f->slots[slot];
+        plr_slot *s = &f->belief.slots[slot];
         plr_polar from, there, to;
         plr_real M[4], w[3], rigid[9];
         plr_polar_at(&from, s->x);
@@ -299,7 +301,7 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         plr_polar_at(&there, s->x);
         chart_jacobian(rigid, &there, common->R, common->p, &from);
         turn_rest(w, rigid, &there, &from);
-        cut += plr_polar_retract(&to, M, &there, w, f->par.min_inverse_range, s->x, &s->beyond);
+        cut += plr_polar_retract(&to, M, &there, w, f->camera.min_inverse_range, s->x, &s->beyond);
         plr_sensitivity_move_range(f, slot, there.r / to.r);
         plr_real *own = F + 9 * slot;
         for (int k = 0; k < 3; k++) {
@@ -314,13 +316,13 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
 
 static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_real E[9], R[9], p[3];
-    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
+    plr_camera_motion(E, p, &f->camera.given, motion->E, motion->p);
     plr_se3_rotation(R, E);
 
     plr_real *F = f->work.Vt, largest_offset = 0;
     memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        plr_slot *s = &f->slots[slot];
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        plr_slot *s = &f->belief.slots[slot];
         plr_polar from, to;
         const plr_real offset = move_to_linearisation_point(f, slot);
         largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
@@ -351,12 +353,12 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
 }
 
 static PLR_SELDOM void body_drift(plr_filter *f, plr_real sigma) {
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const plr_real *q = f->slots[slot].x, wanders = sigma * q[2];
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        const plr_real *q = f->belief.slots[slot].x, wanders = sigma * q[2];
         const plr_real S_q[9] = {
-            [0] = wanders / f->par.camera.fx, [4] = wanders / f->par.camera.fy};
+            [0] = wanders / f->camera.given.fx, [4] = wanders / f->camera.given.fy};
         plr_real J_q[9], C[9];
-        if (f->slots[slot].known)
+        if (f->belief.slots[slot].known)
             continue;
         point_to_chart(q, S_q, J_q, C);
         plr_covariance_add_to_landmark(f, slot, C);
@@ -369,19 +371,19 @@ static PLR_SELDOM void body_in_world(const plr_filter *f, const plr_slot *slot,
     plr_real s_B[3], offset[3], Ji[9], R_WC[9], R_WB[9];
     double p_WB[3];
     plr_pose_reference(f, R_WB, p_WB);
-    plr_camera_to_body(s_B, &f->par.camera, slot->x);
+    plr_camera_to_body(s_B, &f->camera.given, slot->x);
     plr_mat3_vec(offset, R_WB, s_B);
     for (int i = 0; i < 3; i++)
         point->p_W[i] = p_WB[i] + (double)offset[i];
 
-    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->belief.slots));
     point->J.terms = 0;
     plr_real *own = plr_rows_add(&point->J, row, PLR_LANDMARK_DIM);
     plr_world_by_pose(R_WB, s_B,
                       plr_rows_add(&point->J, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM));
     plr_polar_at(&chart, slot->x);
     plr_polar_to_point(Ji, &chart);
-    plr_mat3_mul_nt(R_WC, R_WB, f->par.camera.R_CB);
+    plr_mat3_mul_nt(R_WC, R_WB, f->camera.given.R_CB);
     plr_mat3_mul(own, R_WC, Ji);
 }
 

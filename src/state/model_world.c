@@ -29,10 +29,10 @@ static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
 static bool world_look(const plr_filter *f, unsigned slot, plr_view *view) {
     plr_real offset[3];
     for (int i = 0; i < 3; i++)
-        offset[i] = (plr_real)((double)f->slots[slot].x[i] - f->p_WB[i]);
-    plr_mat3_tvec(view->s, f->R_WB, offset);
-    plr_camera_from_body(view->q, &f->par.camera, view->s);
-    return view->q[2] >= f->par.min_depth;
+        offset[i] = (plr_real)((double)f->belief.slots[slot].x[i] - f->belief.p_WB[i]);
+    plr_mat3_tvec(view->s, f->belief.R_WB, offset);
+    plr_camera_from_body(view->q, &f->camera.given, view->s);
+    return view->q[2] >= f->camera.min_depth;
 }
 
 /* H_pose = Dz R_CB [-I | [s]x], H_l = Dz R_CB R^T (III.7, III.11). */
@@ -42,11 +42,12 @@ static void world_derive(const plr_filter *f, unsigned slot, const plr_view *vie
     plr_real DzR[9], S[9], DzRS[9];
     (void)along;
     (void)z;
-    plr_mat3_mul(DzR, Dz, f->par.camera.R_CB);
+    plr_mat3_mul(DzR, Dz, f->camera.given.R_CB);
     plr_skew(S, view->s);
     plr_mat3_mul(DzRS, DzR, S);
     H->terms = 0;
-    plr_mat3_mul_nt(plr_rows_add(H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM), DzR, f->R_WB);
+    plr_mat3_mul_nt(plr_rows_add(H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM), DzR,
+                    f->belief.R_WB);
     plr_real *by_pose = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
@@ -58,14 +59,14 @@ static void world_derive(const plr_filter *f, unsigned slot, const plr_view *vie
 static void world_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                              plr_new_landmark *landmark) {
     plr_real s[3], offset[3], RS[9];
-    plr_camera_to_body(s, &f->par.camera, q);
-    plr_mat3_vec(offset, f->R_WB, s);
+    plr_camera_to_body(s, &f->camera.given, q);
+    plr_mat3_vec(offset, f->belief.R_WB, s);
     for (int i = 0; i < 3; i++)
-        landmark->x[i] = (plr_real)(f->p_WB[i] + (double)offset[i]);
+        landmark->x[i] = (plr_real)(f->belief.p_WB[i] + (double)offset[i]);
     landmark->uses_pose = f->config.landmark_prior == PLR_PRIOR_CORRELATED;
     if (landmark->uses_pose)
-        plr_world_by_pose(f->R_WB, s, landmark->J_pose);
-    plr_mat3_mul_nt(landmark->J_q, f->R_WB, f->par.camera.R_CB); /* R_WC */
+        plr_world_by_pose(f->belief.R_WB, s, landmark->J_pose);
+    plr_mat3_mul_nt(landmark->J_q, f->belief.R_WB, f->camera.given.R_CB); /* R_WC */
     plr_mat3_mul(RS, landmark->J_q, S_q);
     plr_mat3_mul_nt(landmark->P, RS, RS);
 }
@@ -84,16 +85,16 @@ static bool world_adopt(const plr_filter *f, const plr_landmark *known,
 
 static unsigned world_retract(plr_filter *f, const plr_real *dx) {
     (void)f;
-    for (unsigned slot = 0; slot < f->count; slot++)
+    for (unsigned slot = 0; slot < f->belief.count; slot++)
         for (unsigned i = 0; i < 3; i++)
-            f->slots[slot].x[i] += dx[plr_covariance_row(f, slot) + i];
+            f->belief.slots[slot].x[i] += dx[plr_covariance_row(f, slot) + i];
     return 0;
 }
 
 static void world_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
     for (int i = 0; i < 3; i++)
         point->p_W[i] = (double)slot->x[i];
-    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->belief.slots));
     point->J.terms = 0;
     plr_mat3_identity(plr_rows_add(&point->J, row, PLR_LANDMARK_DIM));
 }

@@ -12,26 +12,26 @@ void plr_motion_clear(plr_filter *f) {
     memset(&f->motion, 0, sizeof f->motion);
     if (!plr_has_block(f, PLR_BLOCK_VELOCITY))
         return;
-    const unsigned own = plr_row_of(f, PLR_BLOCK_VELOCITY) - f->layout.driver;
-    memset(&f->core_motion, 0, sizeof f->core_motion);
+    const unsigned own = plr_row_of(f, PLR_BLOCK_VELOCITY) - f->belief.layout.driver;
+    memset(&f->motion.core, 0, sizeof f->motion.core);
     for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
-        f->core_motion.V[PLR_DRIVERS * i + own + i] = 1;
+        f->motion.core.V[PLR_DRIVERS * i + own + i] = 1;
 }
 
 void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
                      const double p_WB[3]) {
     plr_real offset[3], d[3], dR[9];
     for (int i = 0; i < 3; i++)
-        offset[i] = (plr_real)(p_WB[i] - f->p_WB[i]);
-    plr_mat3_tvec(d, f->R_WB, offset);
-    plr_mat3_mul_tn(dR, f->R_WB, R_WB);
+        offset[i] = (plr_real)(p_WB[i] - f->belief.p_WB[i]);
+    plr_mat3_tvec(d, f->belief.R_WB, offset);
+    plr_mat3_mul_tn(dR, f->belief.R_WB, R_WB);
     for (int i = 0; i < 9; i += 4)
         dR[i] -= PLR_R(1);
     plr_se3_append(f->motion.E, f->motion.p, dR, d);
     f->motion.pending = 1;
-    f->t_ns = t_ns;
-    memcpy(f->R_WB, R_WB, sizeof f->R_WB);
-    memcpy(f->p_WB, p_WB, sizeof f->p_WB);
+    f->belief.t_ns = t_ns;
+    memcpy(f->belief.R_WB, R_WB, sizeof f->belief.R_WB);
+    memcpy(f->belief.p_WB, p_WB, sizeof f->belief.p_WB);
 }
 
 /* This part of B P_dd B^T is added to M as noise. With Q = 0 to know the motion would otherwise
@@ -39,9 +39,9 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
 #define SHARE_OF_STATE PLR_R(1e-4)
 
 void plr_motion_covariance_by_state(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]) {
-    const unsigned m = f->layout.drivers;
+    const unsigned m = f->belief.layout.drivers;
     plr_real P_dd[PLR_DRIVERS * PLR_DRIVERS];
-    plr_covariance_with_drivers(f, f->layout.driver, m, P_dd);
+    plr_covariance_with_drivers(f, f->belief.layout.driver, m, P_dd);
     plr_sandwich_drivers(BPB, m, f->motion.B, P_dd);
 }
 
@@ -62,7 +62,7 @@ void plr_motion_solve(const plr_real L[PLR_POSE_SQUARE], unsigned columns, plr_r
 void plr_motion_by_drivers(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE],
                            plr_real K[PLR_MOTION_BY]) {
     memcpy(K, f->motion.B, sizeof f->motion.B);
-    plr_motion_solve(L, f->layout.drivers, K, PLR_DRIVERS);
+    plr_motion_solve(L, f->belief.layout.drivers, K, PLR_DRIVERS);
 }
 
 void plr_motion_transpose(const plr_real K[PLR_MOTION_BY], plr_real Kt[PLR_MOTION_BY]) {
@@ -102,12 +102,12 @@ void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied) {
 }
 
 void plr_motion_open_velocity(plr_filter *f) {
-    plr_core_motion *m = &f->core_motion;
+    plr_core_motion *m = &f->motion.core;
     const plr_real seconds = f->motion.seconds;
     plr_real W[9];
     if (!plr_has_block(f, PLR_BLOCK_VELOCITY) || !(seconds > 0))
         return;
-    plr_skew(W, f->inertial.velocity);
+    plr_skew(W, f->belief.velocity);
     for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++) {
         m->Q_nc[(PLR_REST_DIM + 1) * i] += PLR_R(1.5) * OPEN_WAY / seconds;
         m->Q_cc[(PLR_REST_DIM + 1) * i] += PLR_R(3) * OPEN_WAY / (seconds * seconds);
@@ -136,7 +136,7 @@ void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
 
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     const plr_motion *m = &f->motion;
-    const unsigned drivers = f->layout.drivers;
+    const unsigned drivers = f->belief.layout.drivers;
     plr_real A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], R[9], BPB[PLR_POSE_SQUARE];
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);

@@ -9,13 +9,13 @@
 /* Not made orthonormal, R would deviate from a rotation by 0.01 in an hour of float32 steps. */
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
     plr_real step[3], change[9];
-    plr_mat3_vec(step, f->R_WB, d);
-    plr_mat3_mul(change, f->R_WB, E);
+    plr_mat3_vec(step, f->belief.R_WB, d);
+    plr_mat3_mul(change, f->belief.R_WB, E);
     for (int i = 0; i < 3; i++)
-        f->p_WB[i] += (double)step[i];
+        f->belief.p_WB[i] += (double)step[i];
     for (int i = 0; i < 9; i++)
-        f->R_WB[i] += change[i];
-    plr_so3_orthonormalise(f->R_WB);
+        f->belief.R_WB[i] += change[i];
+    plr_so3_orthonormalise(f->belief.R_WB);
 }
 
 bool plr_pose_is_correction(const plr_real xi[PLR_POSE_DIM]) {
@@ -42,25 +42,25 @@ static void between(const plr_real R_from[9], const double p_from[3], const plr_
 void plr_pose_moved_from(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
                          plr_real moved[PLR_POSE_DIM]) {
     plr_real turn[9];
-    between(R_WB, p_WB, f->R_WB, f->p_WB, moved, turn);
+    between(R_WB, p_WB, f->belief.R_WB, f->belief.p_WB, moved, turn);
     plr_turn_of(moved + 3, turn);
 }
 
 void plr_pose_towards(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
                       plr_real xi[PLR_POSE_DIM]) {
     plr_real turn[9];
-    between(f->R_WB, f->p_WB, R_WB, p_WB, xi, turn);
+    between(f->belief.R_WB, f->belief.p_WB, R_WB, p_WB, xi, turn);
     plr_so3_log(xi + 3, turn);
 }
 
 void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
     plr_real moved[3];
-    memcpy(R_WB, f->R_WB, sizeof f->R_WB);
-    memcpy(p_WB, f->p_WB, sizeof f->p_WB);
+    memcpy(R_WB, f->belief.R_WB, sizeof f->belief.R_WB);
+    memcpy(p_WB, f->belief.p_WB, sizeof f->belief.p_WB);
     if (!f->motion.pending)
         return;
     plr_real back[9];
-    plr_mat3_mul_nt(back, f->R_WB, f->motion.E); /* T D^-1 */
+    plr_mat3_mul_nt(back, f->belief.R_WB, f->motion.E); /* T D^-1 */
     for (int i = 0; i < 9; i++)
         R_WB[i] += back[i];
     plr_so3_orthonormalise(R_WB);
@@ -83,7 +83,7 @@ void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
 
 void plr_filter_diverge(plr_filter *f) {
     if (!f->diverged)
-        f->totals.diverged_ns = f->t_ns;
+        f->totals.diverged_ns = f->belief.t_ns;
     f->diverged = 1;
     f->work.noise.open = 0; /* W is not added to P any more */
 }

@@ -9,8 +9,8 @@
 #include "state/sensitivity.h"
 
 uint16_t plr_slots_find(const plr_filter *f, uint32_t id) {
-    for (unsigned slot = 0; slot < f->count; slot++)
-        if (f->slots[slot].id == id)
+    for (unsigned slot = 0; slot < f->belief.count; slot++)
+        if (f->belief.slots[slot].id == id)
             return (uint16_t)slot;
     return PLR_NO_SLOT;
 }
@@ -19,8 +19,8 @@ uint16_t plr_slots_find(const plr_filter *f, uint32_t id) {
 static uint16_t oldest(const plr_filter *f) {
     uint16_t found = PLR_NO_SLOT;
     uint32_t age = 0;
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const uint32_t unseen = f->frame_number - f->slots[slot].last_frame;
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        const uint32_t unseen = f->belief.frame_number - f->belief.slots[slot].last_frame;
         if (unseen > age) {
             age = unseen;
             found = (uint16_t)slot;
@@ -30,14 +30,14 @@ static uint16_t oldest(const plr_filter *f) {
 }
 
 unsigned plr_slots_room(const plr_filter *f) {
-    unsigned room = f->config.slots > f->count ? f->config.slots - f->count : 0;
-    for (unsigned slot = 0; slot < f->count; slot++)
-        room += f->slots[slot].last_frame != f->frame_number;
+    unsigned room = f->config.slots > f->belief.count ? f->config.slots - f->belief.count : 0;
+    for (unsigned slot = 0; slot < f->belief.count; slot++)
+        room += f->belief.slots[slot].last_frame != f->belief.frame_number;
     return room;
 }
 
 bool plr_slots_make_room(plr_filter *f, uint16_t *evicted, bool *sink_failed) {
-    if (f->count < f->config.slots)
+    if (f->belief.count < f->config.slots)
         return true;
     const uint16_t slot = oldest(f);
     if (slot == PLR_NO_SLOT)
@@ -56,27 +56,27 @@ bool plr_slots_make_room(plr_filter *f, uint16_t *evicted, bool *sink_failed) {
 
 void plr_slots_append(plr_filter *f, uint32_t id, bool known, const plr_new_landmark *landmark) {
     plr_covariance_append(f, landmark);
-    plr_slot *slot = &f->slots[f->count++];
+    plr_slot *slot = &f->belief.slots[f->belief.count++];
     memset(slot, 0, sizeof *slot);
     memcpy(slot->x, landmark->x, sizeof slot->x);
     slot->id = id;
     slot->known = known;
     slot->times_seen = known ? 0 : 1; /* a known one is counted when it is matched */
-    slot->last_frame = f->frame_number;
-    slot->last_seen_ns = f->t_ns;
+    slot->last_frame = f->belief.frame_number;
+    slot->last_seen_ns = f->belief.t_ns;
 }
 
 void plr_slots_remove(plr_filter *f, unsigned slot) {
     plr_covariance_remove(f, slot);
-    f->count--;
-    if (slot == f->count)
+    f->belief.count--;
+    if (slot == f->belief.count)
         return;
-    f->slots[slot] = f->slots[f->count];
-    f->work.verdict[slot] = f->work.verdict[f->count];
+    f->belief.slots[slot] = f->belief.slots[f->belief.count];
+    f->work.verdict[slot] = f->work.verdict[f->belief.count];
 }
 
 bool plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark) {
-    const plr_slot *s = &f->slots[slot];
+    const plr_slot *s = &f->belief.slots[slot];
     plr_world_point point;
     plr_real P[9];
     plr_model_of(f)->in_world(f, s, &point);

@@ -68,5 +68,5 @@ static void test_hours_without_noise_stay_exact(void) {
     rig_stand(FRAMES);
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
     TEST_ASSERT_GREATER_THAN_DOUBLE(0, rig_smallest_correlation());
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.p_WB[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.belief.p_WB[0]);
 }

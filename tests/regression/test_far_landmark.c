@@ -28,7 +28,7 @@ static void check_bearing_variances(double sigma_rad) {
     const unsigned row = plr_covariance_row(&filter, 0);
     const double full = sigma_rad * sigma_rad;
     for (unsigned i = row; i < row + 2; i++) {
-        const double variance = (double)filter.P[plr_packed_at(i, i)];
+        const double variance = (double)filter.belief.P[plr_packed_at(i, i)];
         TEST_ASSERT_DOUBLE_WITHIN(0.4 * full, 0.6 * full, variance);
     }
 }

@@ -36,7 +36,8 @@ void setUp(void) {
 static void test_a_pose_is_found_by_the_camera_as_it_is_estimated(void) {
     plr_found_pose found;
     rig_drive(100);
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, -TURNED_RAD, (double)rig.filter.calibration.moved[1]); /* y */
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, -TURNED_RAD,
+                              (double)rig.filter.camera.estimate.moved[1]); /* y */
     rig_twists();
     const plr_frame frame = scene_look(&rig.world);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));

@@ -46,7 +46,7 @@ static void random_point(rng *r, double q[3]) {
 
 /* A landmark of that camera point: itself, or its place in the world. */
 static void put_point(const plr_filter *f, const double q[3], plr_slot *slot) {
-    const plr_camera *c = &f->par.camera;
+    const plr_camera *c = &f->camera.given;
     double s[3] = {0}, m[3];
     memcpy(m, q, sizeof m);
     if (f->config.model == PLR_MODEL_WORLD) {
@@ -54,9 +54,9 @@ static void put_point(const plr_filter *f, const double q[3], plr_slot *slot) {
             for (int j = 0; j < 3; j++)
                 s[i] += (double)c->R_CB[3 * j + i] * (q[j] - (double)c->t_CB[j]);
         for (int i = 0; i < 3; i++) {
-            m[i] = f->p_WB[i];
+            m[i] = f->belief.p_WB[i];
             for (int j = 0; j < 3; j++)
-                m[i] += (double)f->R_WB[3 * i + j] * s[j];
+                m[i] += (double)f->belief.R_WB[3 * i + j] * s[j];
         }
     }
     to_reals(slot->x, m, 3);
@@ -82,23 +82,23 @@ static void random_covariance(plr_filter *f, rng *r) {
     for (unsigned i = 0; i < n; i++)
         for (unsigned j = 0; j < n; j++)
             A[i * n + j] *= sigma_of(f, i) * sigma_of(f, j);
-    pack_lower(f->P, A, n);
+    pack_lower(f->belief.P, A, n);
     free(A);
 }
 
 /* Landmarks and a covariance for a filter that was initialised. */
 static void fill(plr_filter *f, rng *r, unsigned landmarks) {
-    f->frame_number = 1;
-    for (f->count = 0; f->count < landmarks; f->count++) {
-        plr_slot *slot = &f->slots[f->count];
+    f->belief.frame_number = 1;
+    for (f->belief.count = 0; f->belief.count < landmarks; f->belief.count++) {
+        plr_slot *slot = &f->belief.slots[f->belief.count];
         double q[3];
         random_point(r, q);
         memset(slot, 0, sizeof *slot);
         put_point(f, q, slot);
-        slot->id = f->count + 1;
+        slot->id = f->belief.count + 1;
         slot->times_seen = 1;
-        slot->last_frame = f->frame_number;
-        slot->last_seen_ns = f->t_ns;
+        slot->last_frame = f->belief.frame_number;
+        slot->last_seen_ns = f->belief.t_ns;
     }
     random_covariance(f, r);
     reseal(f);
@@ -122,7 +122,7 @@ void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, uns
     default_config(&config, model, bias);
     place(f, r, &config);
     for (int i = 0; bias && i < 6; i++)
-        f->bias[i] = (plr_real)(0.01 * rng_normal(r));
+        f->belief.bias[i] = (plr_real)(0.01 * rng_normal(r));
     fill(f, r, landmarks);
 }
 
@@ -137,14 +137,14 @@ void specimen_imu(plr_filter *f, rng *r, unsigned landmarks) {
     if (plr_filter_set_velocity(f, v, variance) != PLR_OK)
         abort();
     for (int i = 0; i < 6; i++)
-        f->bias[i] = (plr_real)((i < 3 ? 0.1 : 0.01) * rng_normal(r));
+        f->belief.bias[i] = (plr_real)((i < 3 ? 0.1 : 0.01) * rng_normal(r));
     fill(f, r, landmarks);
 }
 
 double *specimen_covariance(const plr_filter *f) {
     const unsigned n = plr_covariance_dim(f);
     double *P = specimen_zeros(n, n);
-    unpack_symmetric(P, f->P, n);
+    unpack_symmetric(P, f->belief.P, n);
     return P;
 }
 
@@ -206,7 +206,7 @@ plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observa
 plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {
     plr_real z[3];
     specimen_prediction(f, slot, z);
-    return (plr_observation){f->slots[slot].id, (float)z[0] + shift_px[0],
+    return (plr_observation){f->belief.slots[slot].id, (float)z[0] + shift_px[0],
                              (float)z[2] + shift_px[1], (float)z[1] + shift_px[2],
                              (float)z[2] + shift_px[3]};
 }

@@ -24,8 +24,8 @@ void setUp(void) {
 
 static void check_layout(void) {
     const unsigned first = twin.filter.config.bias ? 12 : 6;
-    TEST_ASSERT_EQUAL_UINT(first + 3 * twin.filter.count, plr_covariance_dim(&twin.filter));
-    for (unsigned slot = 0; slot < twin.filter.count; slot++)
+    TEST_ASSERT_EQUAL_UINT(first + 3 * twin.filter.belief.count, plr_covariance_dim(&twin.filter));
+    for (unsigned slot = 0; slot < twin.filter.belief.count; slot++)
         TEST_ASSERT_EQUAL_UINT(first + 3 * slot, plr_covariance_row(&twin.filter, slot));
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(twin.n, plr_covariance_ld(&twin.filter));
     TEST_ASSERT_LESS_THAN_UINT(twin.n + PLR_TILE_COLUMNS, plr_covariance_ld(&twin.filter));
@@ -57,7 +57,7 @@ static void test_blocks_are_read_as_they_stand(void) {
 }
 
 static void check_set(void) {
-    if (twin.filter.count > 0)
+    if (twin.filter.belief.count > 0)
         return;
     double P_xi[36];
     const double variance[6] = {1, 2, 3, 4, 5, 6};
@@ -86,7 +86,7 @@ static void test_pose_and_bias_are_set_without_correlation(void) {
 }
 
 static void check_joint(void) {
-    for (unsigned slot = 0; slot < twin.filter.count; slot++) {
+    for (unsigned slot = 0; slot < twin.filter.belief.count; slot++) {
         plr_real got[9];
         double pose[18], landmark[9], joint[9], got_double[9];
         double *J = specimen_zeros(3, twin.n);
@@ -122,7 +122,7 @@ static void check_positive(void) {
     static const plr_real spoilt[3] = {PLR_R(-1e-30), (plr_real)NAN, (plr_real)INFINITY};
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&twin.filter));
     for (unsigned i = 0; i < twin.n; i++) {
-        plr_real *variance = &twin.filter.P[plr_packed_at(i, i)];
+        plr_real *variance = &twin.filter.belief.P[plr_packed_at(i, i)];
         const plr_real before = *variance;
         for (int k = 0; k < 3; k++) {
             *variance = spoilt[k];
@@ -146,7 +146,7 @@ static void check_transport(void) {
     double *T = twin_identity();
     twin_random(A, same, 36);
     specimen_put(T, twin.n, 0, 0, 6, 6, same);
-    for (unsigned slot = 0; slot < twin.filter.count; slot++) {
+    for (unsigned slot = 0; slot < twin.filter.belief.count; slot++) {
         const unsigned row = plr_covariance_row(&twin.filter, slot);
         twin_random(F + 9 * slot, same, 9);
         specimen_put(T, twin.n, row, row, 3, 3, same);
@@ -208,8 +208,8 @@ static void test_motion_of_the_pose_alone_agrees(void) {
 static void check_walk(void) {
     if (!twin.filter.config.bias)
         return;
-    twin.filter.par.bias_velocity_walk = PLR_R(0.125);
-    twin.filter.par.bias_gyro_walk = PLR_R(0.03125);
+    twin.filter.source.bias_velocity_walk = PLR_R(0.125);
+    twin.filter.source.bias_gyro_walk = PLR_R(0.03125);
     plr_process_twist.walk(&twin.filter, 2);
     for (unsigned i = 6; i < 12; i++)
         twin.expected[i * twin.n + i] += i < 9 ? 0.25 : 0.0625;

@@ -33,7 +33,7 @@ static void random_rows(plr_rows *rows, bool uses_pose, double *H, unsigned slot
 
 static void check_innovation(void) {
     double *H = specimen_zeros(3, twin.n);
-    for (unsigned slot = 0; slot < twin.filter.count; slot++)
+    for (unsigned slot = 0; slot < twin.filter.belief.count; slot++)
         for (int uses_pose = 0; uses_pose < 2; uses_pose++) {
             plr_rows rows_of_H;
             plr_real S[9];
@@ -54,7 +54,7 @@ static void test_innovation_covariance_agrees(void) {
 static void check_project(void) {
     const unsigned ld = plr_covariance_ld(&twin.filter);
     double *H = specimen_zeros(3, twin.n), *HP = specimen_zeros(3, twin.n);
-    for (unsigned slot = 0; slot < twin.filter.count; slot++)
+    for (unsigned slot = 0; slot < twin.filter.belief.count; slot++)
         for (int uses_pose = 0; uses_pose < 2; uses_pose++) {
             plr_rows rows_of_H;
             plr_real *rows = twin.filter.work.Vt;
@@ -95,7 +95,7 @@ static void fill_rows(unsigned depth, double share, double *Vt) {
 static void check_subtract(void) {
     double *Vt = specimen_zeros(PLR_BLOCK_ROWS, twin.n);
     for (unsigned depth = 1; depth <= PLR_BLOCK_ROWS; depth += 11) {
-        pack_lower(twin.filter.P, twin.P, twin.n);
+        pack_lower(twin.filter.belief.P, twin.P, twin.n);
         fill_rows(depth, 0.9 / depth, Vt);
         memcpy(twin.expected, twin.P, (size_t)twin.n * twin.n * sizeof *twin.P);
         oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, twin.n, twin.n, depth, -1, Vt, Vt, 1,
@@ -121,7 +121,7 @@ static void check_subtract_refuses(void) {
     double *Vt = specimen_zeros(3, twin.n);
     plr_real *before = malloc(plr_packed_row(twin.n) * sizeof *before);
     TEST_ASSERT_NOT_NULL(before);
-    memcpy(before, twin.filter.P, plr_packed_row(twin.n) * sizeof *before);
+    memcpy(before, twin.filter.belief.P, plr_packed_row(twin.n) * sizeof *before);
     const unsigned ld = plr_covariance_ld(&twin.filter);
     for (unsigned i = 0; i < twin.n; i++) {
         fill_rows(3, 0.1, Vt);
@@ -130,7 +130,8 @@ static void check_subtract_refuses(void) {
         twin.filter.work.Vt[2 * ld + i] = (plr_real)NAN;
         TEST_ASSERT_FALSE_MESSAGE(plr_covariance_subtract(&twin.filter, 3), twin.at);
     }
-    TEST_ASSERT_TRUE_MESSAGE(same_bits(before, twin.filter.P, plr_packed_row(twin.n)), twin.at);
+    TEST_ASSERT_TRUE_MESSAGE(same_bits(before, twin.filter.belief.P, plr_packed_row(twin.n)),
+                             twin.at);
     free(before);
     free(Vt);
 }
@@ -143,7 +144,7 @@ static void check_subtract_exact_pose(void) {
     double *Vt = specimen_zeros(3, twin.n);
     for (unsigned i = 0; i < 6; i++)
         for (unsigned j = 0; j < twin.n; j++)
-            twin.filter.P[plr_packed_at(i, j)] = 0;
+            twin.filter.belief.P[plr_packed_at(i, j)] = 0;
     fill_rows(3, 0.2, Vt);
     for (unsigned k = 0; k < 3; k++)
         memset(twin.filter.work.Vt + k * plr_covariance_ld(&twin.filter), 0, 6 * sizeof(plr_real));
@@ -174,11 +175,11 @@ static void check_append(void) {
         for (unsigned i = 0; i < 9; i++)
             grown[(twin.n + i / 3) * (twin.n + 3) + twin.n + i % 3] += own[i];
         plr_covariance_append(&twin.filter, &landmark);
-        twin.filter.count++;
+        twin.filter.belief.count++;
         double *got = specimen_covariance(&twin.filter);
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(100 * eps, 0, specimen_gap(twin.n + 3, grown, got),
                                           twin.at);
-        twin.filter.count--;
+        twin.filter.belief.count--;
         free(got);
         free(grown);
         free(J);
@@ -190,21 +191,21 @@ static void test_a_new_landmark_appends_its_rows(void) {
 }
 
 static void check_remove(void) {
-    const unsigned count = twin.filter.count;
+    const unsigned count = twin.filter.belief.count;
     for (unsigned slot = 0; slot < count; slot++) {
-        pack_lower(twin.filter.P, twin.P, twin.n);
+        pack_lower(twin.filter.belief.P, twin.P, twin.n);
         const unsigned to = plr_covariance_row(&twin.filter, slot);
         plr_covariance_remove(&twin.filter, slot);
-        twin.filter.count--;
+        twin.filter.belief.count--;
         /* the last landmark's rows stand where the removed one's stood */
         for (unsigned i = 0; i < twin.n - 3; i++)
             for (unsigned j = 0; j <= i; j++) {
                 const unsigned a = i >= to && i < to + 3 ? twin.n - 3 + (i - to) : i;
                 const unsigned b = j >= to && j < to + 3 ? twin.n - 3 + (j - to) : j;
                 TEST_ASSERT_EQUAL_DOUBLE(twin.P[a * twin.n + b],
-                                         (double)twin.filter.P[plr_packed_at(i, j)]);
+                                         (double)twin.filter.belief.P[plr_packed_at(i, j)]);
             }
-        twin.filter.count++;
+        twin.filter.belief.count++;
     }
 }
 

@@ -178,7 +178,7 @@ static void test_trace_is_of_pose_and_biases_now_and_the_landmarks(void) {
         for (int i = 0; i < 6; i++)
             sum += P[7 * i];
         for (unsigned i = 12; i < plr_covariance_dim(&rig.filter); i++)
-            sum += (double)rig.filter.P[plr_packed_at(i, i)];
+            sum += (double)rig.filter.belief.P[plr_packed_at(i, i)];
         TEST_ASSERT_DOUBLE_WITHIN(1e-12 * sum, sum, plr_filter_trace(&rig.filter));
     }
     TEST_ASSERT_EQUAL_DOUBLE(0, plr_filter_trace(NULL));

@@ -25,8 +25,8 @@ enum { FRAMES = 25, FEW = 7 };
 static unsigned calls[SCENE_MAX_LANDMARKS + 100]; /* of this frame, by the landmark's id */
 
 static void count(const plr_filter *f, unsigned slot) {
-    TEST_ASSERT_LESS_THAN_UINT(sizeof calls / sizeof *calls, f->slots[slot].id);
-    calls[f->slots[slot].id]++;
+    TEST_ASSERT_LESS_THAN_UINT(sizeof calls / sizeof *calls, f->belief.slots[slot].id);
+    calls[f->belief.slots[slot].id]++;
 }
 
 static void derive_body(const plr_filter *f, unsigned slot, const plr_view *view,

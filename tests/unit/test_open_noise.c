@@ -55,7 +55,7 @@ static void take_specimen(noise_kind kind, bool bias, bool shifted) {
     double z_double[6];
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, bias, MANY);
     specimen_motion(&filter, &chance, &filter.motion);
-    filter.par.bias_velocity_walk = filter.par.bias_gyro_walk = 0; /* tests of motion.c */
+    filter.source.bias_velocity_walk = filter.source.bias_gyro_walk = 0; /* tests of motion.c */
     set_noise(kind, &filter.motion);
     for (unsigned i = 0; bias && i < 36; i++) /* as a tenth of a second of driving leaves it */
         filter.motion.B[PLR_DRIVERS * (i / 6) + i % 6] =
@@ -118,11 +118,11 @@ static double *entrance(void) {
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, L, z, 0, at_n);
     rigid_right_jacobian(Jr, at_n);
     specimen_put(GJ, 6, 0, 0, 6, 6, Jr);
-    for (unsigned slot = 0; slot < filter.count; slot++) {
+    for (unsigned slot = 0; slot < filter.belief.count; slot++) {
         double q[3], K[18], Jw[9], Ji[9], JK[18];
-        to_doubles(q, filter.slots[slot].x, 3);
+        to_doubles(q, filter.belief.slots[slot].x, 3);
         observe_camera_by_pose(&camera, q, K);
-        specimen_chart(filter.slots[slot].x, Jw, Ji);
+        specimen_chart(filter.belief.slots[slot].x, Jw, Ji);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, Jw, K, 0, JK);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 6, 1, JK, Jr, 0,
                     GJ + 6 * plr_covariance_row(&filter, slot));
@@ -247,9 +247,9 @@ static void one_gain(joint_update *u) {
 static void retract_joint(const plr_filter *before, const plr_real *dx, joint_update *u) {
     static plr_filter copy;
     copy = *before;
-    pack_lower(copy.P, u->P, u->n);
+    pack_lower(copy.belief.P, u->P, u->n);
     (void)plr_model_of(&copy)->retract(&copy, dx);
-    unpack_symmetric(u->P, copy.P, u->n);
+    unpack_symmetric(u->P, copy.belief.P, u->n);
 }
 
 /*
@@ -282,8 +282,8 @@ static void check_update(noise_kind kind, bool bias, bool shifted) {
     for (unsigned slot = 0; slot < count; slot++) {
         const float u = (float)rng_normal(&chance), v = (float)rng_normal(&chance);
         const float shift[4] = {u, v, (float)(0.9 * (double)u), v};
-        if (!(filter.slots[slot].x[2] > 1)) /* a shift may take one beside the camera */
-            filter.slots[slot].x[2] = 1;
+        if (!(filter.belief.slots[slot].x[2] > 1)) /* a shift may take one beside the camera */
+            filter.belief.slots[slot].x[2] = 1;
         seen[slot] = specimen_observation(&filter, slot, shift);
         TEST_ASSERT_TRUE(plr_stereo_measure(&filter, slot, &seen[slot], &measured[slot]));
     }

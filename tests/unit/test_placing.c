@@ -50,7 +50,7 @@ static void see(plr_seen_known *known, const double q[3], double map_sigma, doub
     rigid_apply(w, back, q);
     rng_normals(&chance, map_sigma, off, 3);
     rng_normals(&chance, pixel_sigma, noise, 4);
-    plr_stereo_project(z, &f.par.camera, at);
+    plr_stereo_project(z, &f.camera.given, at);
     for (unsigned i = 0; i < 3; i++) {
         known->w[i] = (plr_real)(w[i] + off[i]);
         known->P[4 * i] = (plr_real)(map_sigma * map_sigma);

@@ -55,16 +55,16 @@ static void residual_beside(const plr_reading *reading, int direction, double h,
     double xi[6] = {0}, T[16], E[16], moved[16];
     plr_pose pose;
     for (int i = 0; i < 9; i++)
-        pose.R[i] = (double)filter.R_WB[i];
-    memcpy(pose.p, filter.p_WB, sizeof pose.p);
+        pose.R[i] = (double)filter.belief.R_WB[i];
+    memcpy(pose.p, filter.belief.p_WB, sizeof pose.p);
     xi[direction] = h;
     rigid_from_pose(T, &pose);
     rigid_exp(E, xi);
     square_multiply(4, T, E, moved);
     rigid_to_pose(&pose, moved);
     for (int i = 0; i < 9; i++)
-        filter.R_WB[i] = (plr_real)pose.R[i];
-    memcpy(filter.p_WB, pose.p, sizeof pose.p);
+        filter.belief.R_WB[i] = (plr_real)pose.R[i];
+    memcpy(filter.belief.p_WB, pose.p, sizeof pose.p);
     const plr_measurement m = rows_of(reading);
     memcpy(r, m.r, sizeof m.r);
     filter = before;

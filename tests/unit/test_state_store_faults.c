@@ -327,7 +327,7 @@ static void test_a_broken_filter_is_not_saved_over_a_good_one(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, shelf_save(1));
     filter.diverged = 0;
     reseal(&filter);
-    filter.bias[1] = (plr_real)NAN;
+    filter.belief.bias[1] = (plr_real)NAN;
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, shelf_save(1));
     filter.magic = 0;

@@ -20,7 +20,7 @@ void setUp(void) {
 }
 
 static void blocks(double P[][9]) {
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         plr_real P_ll[9];
         plr_covariance_landmark(&rig.filter, slot, P_ll);
         for (unsigned i = 0; i < 9; i++)
@@ -40,8 +40,8 @@ static void drift_of(unsigned slot, double variance, double C[9]) {
     const double f_px[2] = {rig.calibration.fx_px, rig.calibration.fy_px};
     double q[3], Jw[9], Ji[9];
     for (unsigned i = 0; i < 3; i++)
-        q[i] = (double)rig.filter.slots[slot].x[i];
-    specimen_chart(rig.filter.slots[slot].x, Jw, Ji);
+        q[i] = (double)rig.filter.belief.slots[slot].x[i];
+    specimen_chart(rig.filter.belief.slots[slot].x, Jw, Ji);
     memset(C, 0, 9 * sizeof *C);
     for (unsigned axis = 0; axis < 2; axis++)
         for (unsigned i = 0; i < 3; i++)
@@ -54,8 +54,8 @@ static void drift_of(unsigned slot, double variance, double C[9]) {
 static void demand_growth(double before[][9], double variance) {
     static double after[PLR_MAX_LANDMARKS][9];
     blocks(after);
-    TEST_ASSERT_TRUE(rig.filter.count > 5);
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+    TEST_ASSERT_TRUE(rig.filter.belief.count > 5);
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         double C[9];
         drift_of(slot, variance, C);
         for (unsigned i = 0; i < 9; i++)
@@ -95,7 +95,7 @@ static void test_the_disparity_does_not_wander(void) {
     unsigned compared = 0;
     rig_drive(10);
     const plr_observation seen = {0};
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         if (!plr_stereo_measure(&rig.filter, slot, &seen, &m))
             continue;
         plr_covariance_of_rows(&rig.filter, &m.H, before);
@@ -114,8 +114,8 @@ static void test_the_disparity_does_not_wander(void) {
 static void test_landmarks_of_the_map_do_not_wander(void) {
     static double before[PLR_MAX_LANDMARKS][9];
     rig_drive(10);
-    for (unsigned slot = 0; slot < rig.filter.count; slot++)
-        rig.filter.slots[slot].known = 1;
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+        rig.filter.belief.slots[slot].known = 1;
     blocks(before);
     plr_model_of(&rig.filter)->drift(&rig.filter, PLR_R(0.5));
     demand_growth(before, 0);
