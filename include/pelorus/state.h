@@ -87,6 +87,15 @@ typedef struct plr_slot {
     uint16_t rejected;          /* successive frames in which the gate rejected it */
 } plr_slot;
 
+/* What velocity and biases do in the same time, with an IMU (docs/MATH.md 19): the velocity becomes V
+ * x_d plus noise, its biases only gain noise. Q_nc and Q_cc are the covariances of the noise of
+ * velocity and biases with that of n, and with itself. */
+typedef struct plr_core_motion {
+    plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS];
+    plr_real Q_nc[PLR_POSE_DIM * PLR_REST_DIM];
+    plr_real Q_cc[PLR_REST_DIM * PLR_REST_DIM];
+} plr_core_motion;
+
 /* Motion that is already in the pose but not yet in the covariance: D = (I + E, p) with
  * xi+ = Ad(D^-1) xi + n, n = B x_d + N(0, Q), docs/MATH.md 4. x_d are the drivers, plr_layout. */
 typedef struct plr_motion {
@@ -96,16 +105,8 @@ typedef struct plr_motion {
     plr_real seconds;            /* duration, for the bias walk of twists */
     uint8_t pending;             /* 1 if any motion is accumulated */
     uint8_t noisy;               /* 0 if it is exact (mapping): Q and B are zero */
+    plr_core_motion core;        /* with an IMU */
 } plr_motion;
-
-/* The rest of the core in the same motion, with an IMU (docs/MATH.md 19): its velocity becomes V
- * x_d plus noise, its biases only gain noise. Q_nc and Q_cc are the covariances of the noise of
- * velocity and biases with that of n, and with itself. */
-typedef struct plr_core_motion {
-    plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS];
-    plr_real Q_nc[PLR_POSE_DIM * PLR_REST_DIM];
-    plr_real Q_cc[PLR_REST_DIM * PLR_REST_DIM];
-} plr_core_motion;
 
 /* Where a point was in the left picture when the average below began. */
 typedef struct plr_watched_point {
@@ -151,8 +152,7 @@ typedef enum plr_anchored {
 /* What an IMU adds to the state: src/process/imu.c. How readings usually come, `slow` to
  * `off_usual2`, is kept of twists, too: src/process/statistics.h. */
 typedef struct plr_inertial {
-    plr_real velocity[PLR_VELOCITY_DIM]; /* of the body in its own axes, m/s */
-    plr_real slow[PLR_POSE_DIM];         /* mean reading of the last half second */
+    plr_real slow[PLR_POSE_DIM]; /* mean reading of the last half second */
     plr_real spread2[2]; /* mean square difference of readings from `slow`, linear and angular */
     plr_real change2[2]; /* mean square of the difference between successive readings */
     plr_real change[PLR_POSE_DIM]; /* the last of these differences */
@@ -194,16 +194,15 @@ typedef struct plr_velocities {
 
 /* The errors of the calibration that have a column of S: first those that are estimated, then those
  * that are considered. */
-typedef struct plr_calibrated {
+typedef struct plr_error_columns {
     uint8_t kind[PLR_CALIBRATIONS]; /* plr_calibration_error */
     uint8_t count, estimated;
     plr_real variance[PLR_CALIBRATIONS]; /* of the prior */
-} plr_calibrated;
+} plr_error_columns;
 
 /* What has become of the calibration: src/state/calibration.h. */
-typedef struct plr_calibration_estimate {
-    plr_camera
-        eye; /* the camera as estimated; R_CB, t_CB: from the axes that par.camera gives it to
+typedef struct plr_camera_estimate {
+    plr_camera eye; /* the camera as estimated; R_CB, t_CB: from the axes that `given` gives it to
                        where it was at the time of the last frame */
     plr_real R[9], t[3];               /* the same without the clock's part */
     plr_real twist[PLR_POSE_DIM];      /* of the camera at the last frame, m/s and rad/s */
@@ -222,27 +221,73 @@ typedef struct plr_calibration_estimate {
     plr_real sum[PLR_CALIBRATIONS], sum_variance[PLR_CALIBRATIONS], usual[PLR_CALIBRATIONS];
     plr_real usual_frames; /* from which that was learnt */
     plr_real excess; /* the largest that is usual, 1 or more: what is learnt counts 1/excess */
-} plr_calibration_estimate;
+} plr_camera_estimate;
 
-/* Settings and camera in the filter's precision; of sigmas the squares. */
+/* What the settings make of the gate and of pauses. */
 typedef struct plr_parameters {
-    plr_camera camera;
-    plr_real Ad_CB[PLR_POSE_SQUARE]; /* Ad(T_CB): body twists to the camera */
-    plr_real pixel_variance;
-    plr_real velocity_variance[3], gyro_variance[3]; /* of the body's axes */
-    plr_real bias_velocity_walk, bias_gyro_walk;
     plr_real gate_d2, gate_residual2;
-    plr_real min_disparity, max_depth, max_row_gap, min_depth;
-    plr_real landmark_variance;
-    plr_real track_drift; /* variance by which tracks wander in a second, px^2/s */
-    plr_real min_inverse_range;
-    plr_calibrated calibrated;
     plr_time_ns max_gap_ns;
-    plr_real R_BI[9], imu_arm[3]; /* the IMU on the body; the camera above is seen from the arm */
-    plr_real gravity;             /* m/s^2 */
-    plr_real accel_density, gyro_density, accel_walk, gyro_walk; /* squared, of an IMU */
-    plr_real start_velocity_variance;
 } plr_parameters;
+
+/* The camera: what init was given, and from `estimate` on what has become of it. Of sigmas the squares. */
+typedef struct plr_camera_model {
+    plr_camera given;
+    plr_real Ad_CB[PLR_POSE_SQUARE]; /* Ad(T_CB): body twists to the camera */
+    plr_real pixel_variance;         /* px^2 */
+    plr_real track_drift_variance;   /* by which tracks wander in a second, px^2/s */
+    plr_real min_disparity, max_row_gap;
+    plr_real min_depth, max_depth, min_inverse_range;
+    plr_real landmark_variance;
+    plr_error_columns errors;
+    plr_camera_estimate estimate;
+} plr_camera_model;
+
+/* The source of motion, twists or an IMU: what init was given, and from `reading_ns` on what its readings have
+ * shown. Of sigmas the squares. */
+typedef struct plr_source {
+    plr_real velocity_variance[3], gyro_variance[3]; /* of twists, in the body's axes */
+    plr_real bias_velocity_walk, bias_gyro_walk;     /* of twists: variance that a second adds */
+    plr_real R_BI[9], imu_arm[3];         /* the IMU on the body; `given` is seen from the arm */
+    plr_real gravity;                     /* m/s^2 */
+    plr_real accel_density, gyro_density; /* of an IMU: variance times the seconds of a reading */
+    plr_real accel_walk_variance, gyro_walk_variance; /* of an IMU: what a second adds */
+    plr_real start_velocity_variance;
+
+    plr_time_ns reading_ns;         /* of the last twist or IMU reading */
+    plr_real interval_s;            /* between the last two of them */
+    plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
+    plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
+    double bias_walked_s; /* for how long the biases have walked since that was their prior */
+    plr_inertial inertial;
+    uint8_t reading_valid;
+    uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
+    /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
+     * twists, while any is known; alignment with an IMU, until it has started. */
+    union {
+        plr_velocities velocities;
+        plr_alignment alignment;
+    } either;
+} plr_source;
+
+/* What is believed of body and landmarks: the state with its covariance. */
+typedef struct plr_belief {
+    plr_layout layout; /* it and the model never change after init */
+    uint8_t model;     /* plr_model_kind: of the table of models */
+
+    unsigned count;   /* active slots, dense from 0 */
+    plr_time_ns t_ns; /* of the estimate */
+    plr_real R_WB[9];
+    uint32_t frame_number; /* here no processor needs padding before p_WB */
+    double p_WB[3]; /* double in both builds: adding a small step to a float32 would lose it */
+    plr_real velocity[PLR_VELOCITY_DIM]; /* with an IMU: of the body in its own axes, m/s */
+    plr_real bias[PLR_BIAS_DIM];
+
+    plr_slot slots[PLR_MAX_LANDMARKS];
+    plr_real P[PLR_PACKED_SIZE + PLR_KERNEL_MARGIN]; /* packed lower triangle: the blocks of
+                                                        plr_layout, landmarks */
+    plr_real S[PLR_CALIBRATIONS][PLR_MAX_LD];        /* the error of each row of P by those of the
+                                                 calibration, relative: src/state/sensitivity.h */
+} plr_belief;
 
 /* The noise of a frame's motion. It is kept apart from P until the frame's observations have been
  * applied: the state's error is x + W nu with nu ~ N(0, I) beforehand, and the observations add
@@ -309,15 +354,13 @@ typedef struct plr_guard {
     uint64_t constant, small, large;
 } plr_guard;
 
-/* The checksums depend on the order of the members: config to model never change after init, work
+/* The checksums depend on the order of the members: config to par never change after init, work
  * changes without a checksum, guard is last. See src/filter/guard.h. */
 typedef struct plr_filter {
     uint32_t magic; /* set by a successful init */
     plr_config config;
     plr_map map;
     plr_parameters par;
-    uint8_t model; /* plr_model_kind: of the table of models */
-    plr_layout layout;
 
     plr_time_ns t_ns;       /* of the estimate */
     plr_time_ns reading_ns; /* of the last twist or IMU reading */
@@ -348,14 +391,10 @@ typedef struct plr_filter {
 
     plr_supervisor supervisor;
     uint16_t frames_off_the_map; /* in succession, that rejected nearly all known landmarks */
-    /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
-     * twists, while any is known; alignment with an IMU, until it has started. */
-    union {
-        plr_velocities velocities;
-        plr_alignment alignment;
-    } either;
-    plr_core_motion core_motion; /* with an IMU; from here on part of the "small" checksum */
-    plr_inertial inertial;       /* with an IMU */
+    uint8_t clock_started, diverged;
+    plr_real recovery_P
+        [PLR_POSE_TRIANGLE]; /* the pose's covariance when it was last in order, plus the motion
+                                since; packed lower triangle */
     plr_totals totals;
     plr_guard guard;
 } plr_filter;

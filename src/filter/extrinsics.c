@@ -11,20 +11,20 @@ static bool has_arm(const plr_filter *f) {
     return plr_dot3(f->source.imu_arm, f->source.imu_arm) > 0;
 }
 
-void plr_extrinsics_set(plr_parameters *par, const plr_config *config) {
+void plr_extrinsics_set(plr_filter *f, const plr_config *config) {
     plr_real turn[3], moved[3];
-    plr_mat3_identity(par->R_BI);
-    memset(par->imu_arm, 0, sizeof par->imu_arm);
+    plr_mat3_identity(f->source.R_BI);
+    memset(f->source.imu_arm, 0, sizeof f->source.imu_arm);
     if (config->process != PLR_PROCESS_IMU)
         return;
     for (int i = 0; i < 3; i++) {
-        par->imu_arm[i] = (plr_real)config->imu_arm_m[i];
+        f->source.imu_arm[i] = (plr_real)config->imu_arm_m[i];
         turn[i] = (plr_real)config->imu_turn_rad[i];
     }
-    plr_so3_exp(par->R_BI, turn);
-    plr_mat3_vec(moved, par->camera.R_CB, par->imu_arm);
+    plr_so3_exp(f->source.R_BI, turn);
+    plr_mat3_vec(moved, f->camera.given.R_CB, f->source.imu_arm);
     for (int i = 0; i < 3; i++)
-        par->camera.t_CB[i] += moved[i];
+        f->camera.given.t_CB[i] += moved[i];
 }
 
 /* P <- A P A^T, A = [I, s [r]x; 0, I]. */

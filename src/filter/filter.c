@@ -58,35 +58,44 @@ static plr_real squared(double x) {
     return (plr_real)(x * x);
 }
 
-static void set_parameters(plr_parameters *par, const plr_calibration *calibration,
-                           const plr_config *c) {
-    set_camera(&par->camera, calibration);
-    plr_extrinsics_set(par, c);
-    plr_se3_adjoint(par->Ad_CB, par->camera.R_CB, par->camera.t_CB);
-    par->pixel_variance = squared(c->pixel_sigma_px);
+static void set_camera_model(plr_camera_model *camera, const plr_calibration *calibration,
+                             const plr_config *c) {
+    set_camera(&camera->given, calibration);
+    camera->pixel_variance = squared(c->pixel_sigma_px);
+    camera->track_drift_variance = squared(c->track_drift_px);
+    camera->min_disparity = (plr_real)c->min_disparity_px;
+    camera->max_row_gap = (plr_real)c->max_row_gap_px;
+    camera->min_depth = (plr_real)c->min_depth_m;
+    camera->max_depth = (plr_real)c->max_depth_m;
+    camera->min_inverse_range = (plr_real)(1 / c->max_range_m);
+    camera->landmark_variance = squared(c->landmark_sigma_m);
+    plr_calibration_lay_out(&camera->errors, c);
+}
+
+static void set_source(plr_source *source, const plr_config *c) {
     for (int i = 0; i < 3; i++) {
-        par->velocity_variance[i] = squared(c->velocity_sigma[i]);
-        par->gyro_variance[i] = squared(c->gyro_sigma[i]);
+        source->velocity_variance[i] = squared(c->velocity_sigma[i]);
+        source->gyro_variance[i] = squared(c->gyro_sigma[i]);
     }
-    par->bias_velocity_walk = (plr_real)c->bias_velocity_walk;
-    par->bias_gyro_walk = (plr_real)c->bias_gyro_walk;
-    par->gate_d2 = (plr_real)c->gate_d2;
-    par->gate_residual2 = squared(c->gate_residual_px);
-    par->min_disparity = (plr_real)c->min_disparity_px;
-    par->max_depth = (plr_real)c->max_depth_m;
-    par->max_row_gap = (plr_real)c->max_row_gap_px;
-    par->min_depth = (plr_real)c->min_depth_m;
-    par->landmark_variance = squared(c->landmark_sigma_m);
-    par->track_drift = squared(c->track_drift_px);
-    par->min_inverse_range = (plr_real)(1 / c->max_range_m);
-    plr_calibration_lay_out(par, c);
-    par->gravity = (plr_real)c->gravity_mps2;
-    par->accel_density = squared(c->accel_noise);
-    par->gyro_density = squared(c->gyro_noise);
-    par->accel_walk = squared(c->accel_walk);
-    par->gyro_walk = squared(c->gyro_walk);
-    par->start_velocity_variance = squared(c->start_velocity_sigma_mps);
-    par->max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
+    source->bias_velocity_walk = (plr_real)c->bias_velocity_walk;
+    source->bias_gyro_walk = (plr_real)c->bias_gyro_walk;
+    source->gravity = (plr_real)c->gravity_mps2;
+    source->accel_density = squared(c->accel_noise);
+    source->gyro_density = squared(c->gyro_noise);
+    source->accel_walk_variance = squared(c->accel_walk);
+    source->gyro_walk_variance = squared(c->gyro_walk);
+    source->start_velocity_variance = squared(c->start_velocity_sigma_mps);
+}
+
+/* All that init derives from settings and calibration. */
+static void set_constants(plr_filter *f, const plr_calibration *calibration, const plr_config *c) {
+    f->par.gate_d2 = (plr_real)c->gate_d2;
+    f->par.gate_residual2 = squared(c->gate_residual_px);
+    f->par.max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
+    set_camera_model(&f->camera, calibration, c);
+    set_source(&f->source, c);
+    plr_extrinsics_set(f, c);
+    plr_se3_adjoint(f->camera.Ad_CB, f->camera.given.R_CB, f->camera.given.t_CB);
 }
 
 plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibration,

@@ -49,10 +49,10 @@ static void add(plr_checksum *sum, const void *memory, size_t bytes) {
     }
 }
 
-/* The members from one offset to another. */
-static void add_between(plr_checksum *sum, const plr_filter *f, size_t from, size_t to) {
-    add(sum, (const unsigned char *)f + from, to - from);
-}
+/* Members of the filter: from the beginning of one to that of another behind it. */
+#define ADD_BETWEEN(sum, f, from, to)                                                              \
+    add((sum), (const unsigned char *)(f) + offsetof(plr_filter, from),                            \
+        offsetof(plr_filter, to) - offsetof(plr_filter, from))
 
 /* A one-to-one function of `mixed` and of `word`. */
 static uint32_t step(uint32_t mixed, uint32_t word) {

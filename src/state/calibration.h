@@ -22,7 +22,7 @@ static inline unsigned plr_calibration_estimated(const plr_error_columns *errors
 }
 
 /* Lays out the columns of S by the settings. */
-void plr_calibration_lay_out(plr_parameters *par, const plr_config *config);
+void plr_calibration_lay_out(plr_error_columns *to, const plr_config *config);
 
 /* The calibration as it was given to init. */
 void plr_calibration_reset(plr_filter *f);

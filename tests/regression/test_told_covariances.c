@@ -62,7 +62,7 @@ static void test_what_is_told_of_a_pose_is_taken_back(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
         TEST_ASSERT_TRUE(plr_is_covariance(P, 6));
         plr_filter other = rig.filter;
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&other, other.t_ns, &pose, P));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&other, other.belief.t_ns, &pose, P));
     }
 }
 

@@ -37,7 +37,7 @@ static void take_specimen(plr_model_kind model, unsigned calibrate) {
     config.centre_sigma_px = 1.5;
     config.camera_place_sigma_m = 0.01;
     config.camera_clock_sigma_s = 0.004;
-    plr_calibration_lay_out(&filter.par, &config);
+    plr_calibration_lay_out(&filter.camera.errors, &config);
     plr_calibration_reset(&filter);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         filter.camera.estimate.twist[i] = (plr_real)(0.3 * rng_normal(&chance));

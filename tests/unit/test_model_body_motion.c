@@ -237,7 +237,7 @@ static void test_a_landmark_that_the_camera_meets_is_kept_off_it(void) {
     take_specimen(true, LANDMARKS);
     without = filter;
     plr_covariance_remove(&without, LANDMARKS - 1);
-    without.count--;
+    without.belief.count--;
 
     plr_filter before = filter;
     drive_filter();

@@ -247,9 +247,9 @@ static void one_gain(joint_update *u) {
 static void retract_joint(const plr_filter *before, const plr_real *dx, joint_update *u) {
     static plr_filter copy;
     copy = *before;
-    pack_lower(copy.P, u->P, u->n);
+    pack_lower(copy.belief.P, u->P, u->n);
     (void)plr_model_of(&copy)->retract(&copy, dx);
-    unpack_symmetric(u->P, copy.P, u->n);
+    unpack_symmetric(u->P, copy.belief.P, u->n);
 }
 
 /*

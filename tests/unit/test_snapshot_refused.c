@@ -57,11 +57,11 @@ static void test_each_setting_that_differs_makes_it_foreign(void) {
         const double end = here > setting->minimum ? setting->minimum : setting->maximum;
         const double another = setting->kind == PLR_SETTING_COUNT ? here + 1 : end;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_set(&other.config, setting, another));
-        other.model = other.config.model;
+        other.belief.model = other.config.model;
         reseal(&other);
         refuses(PLR_E_FOREIGN);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_set(&other.config, setting, here));
-        other.model = other.config.model;
+        other.belief.model = other.config.model;
         reseal(&other);
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
@@ -213,7 +213,7 @@ static void test_a_source_that_tells_another_story_the_second_time_resets_the_fi
     const unsigned second = (state.length + PLR_STATE_CHUNK - 1) / PLR_STATE_CHUNK + 1;
     state.flips_at = second; /* the first byte of the magic */
     TEST_ASSERT_EQUAL_INT(PLR_E_FOREIGN, state_bytes_restore(&state, &other));
-    TEST_ASSERT_EQUAL_UINT(0, other.count);
+    TEST_ASSERT_EQUAL_UINT(0, other.belief.count);
     memcpy(&untouched, &filter, sizeof untouched);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&untouched));
     TEST_ASSERT_TRUE(state_bytes_same_filter(&untouched, &other));
@@ -244,7 +244,7 @@ static void test_a_broken_state_is_not_saved(void) {
 
 static void test_a_diverged_filter_is_sound_again_after_a_restore(void) {
     other.diverged = 1;
-    other.P[0] = -1;
+    other.belief.P[0] = -1;
     reseal(&other);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
     TEST_ASSERT_TRUE(state_bytes_same_filter(&filter, &other));
