@@ -362,36 +362,15 @@ typedef struct plr_filter {
     plr_map map;
     plr_parameters par;
 
-    plr_time_ns t_ns;       /* of the estimate */
-    plr_time_ns reading_ns; /* of the last twist or IMU reading */
-    plr_real interval_s;    /* between the last two of them */
-    uint8_t clock_started, reading_valid;
-    uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
-
-    plr_real R_WB[9];
-    uint32_t frame_number; /* here no processor needs padding before p_WB; likewise health below */
-    double p_WB[3]; /* double in both builds: adding a small step to a float32 would lose it */
-    plr_real bias[PLR_BIAS_DIM];
-    plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
-    double bias_walked_s; /* for how long the biases have walked since that was their prior */
-    plr_real recovery_P
-        [PLR_POSE_TRIANGLE]; /* the pose's covariance when it was last in order, plus the motion
-                                since; packed lower triangle */
-    plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
-    plr_motion motion;
-    plr_calibration_estimate calibration;
-
-    unsigned count; /* active slots, dense from 0 */
-    plr_slot slots[PLR_MAX_LANDMARKS];
-    plr_real P[PLR_PACKED_SIZE + PLR_KERNEL_MARGIN]; /* packed lower triangle: the blocks of
-                                                        plr_layout, landmarks */
-    plr_real S[PLR_CALIBRATIONS][PLR_MAX_LD];        /* the error of each row of P by those of the
-                                                 calibration, relative: src/state/sensitivity.h */
+    plr_camera_model camera;
+    plr_source source;
+    plr_motion motion; /* since the last frame */
+    plr_belief belief;
     plr_workspace work;
 
     plr_supervisor supervisor;
     uint16_t frames_off_the_map; /* in succession, that rejected nearly all known landmarks */
-    uint8_t clock_started, diverged;
+    uint8_t clock_started;
     plr_real recovery_P
         [PLR_POSE_TRIANGLE]; /* the pose's covariance when it was last in order, plus the motion
                                 since; packed lower triangle */

@@ -123,7 +123,7 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
     if (map)
         f->map = *map;
     f->belief.model = config->model;
-    set_parameters(&f->par, calibration, config);
+    set_constants(f, calibration, config);
     plr_process_of(f)->lay_out(f);
     f->magic = PLR_FILTER_MAGIC;
     plr_guard_seal_constant(f);

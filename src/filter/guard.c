@@ -71,16 +71,21 @@ static uint64_t mixed(const plr_checksum *sum) {
 
 static uint64_t constant_sum(const plr_filter *f) {
     plr_checksum sum = {{0}};
-    add_between(&sum, f, offsetof(plr_filter, config), offsetof(plr_filter, belief.t_ns));
+    ADD_BETWEEN(&sum, f, config, camera.estimate);
+    ADD_BETWEEN(&sum, f, source, source.reading_ns);
+    ADD_BETWEEN(&sum, f, belief, belief.count);
     return mixed(&sum);
 }
 
 static uint64_t small_sum(const plr_filter *f) {
     const size_t used = plr_covariance_size(f, f->belief.count);
     plr_checksum sum = {{0}};
-    add_between(&sum, f, offsetof(plr_filter, belief.t_ns), offsetof(plr_filter, belief.slots));
+    ADD_BETWEEN(&sum, f, camera.estimate, source);
+    ADD_BETWEEN(&sum, f, source.reading_ns, source.either);
+    ADD_BETWEEN(&sum, f, motion, belief);
+    ADD_BETWEEN(&sum, f, belief.count, belief.slots);
     add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
-    add_between(&sum, f, offsetof(plr_filter, motion.core), offsetof(plr_filter, guard));
+    ADD_BETWEEN(&sum, f, clock_started, guard);
     if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
         add(&sum, &f->source.either.alignment, sizeof f->source.either.alignment);
     if (f->source.velocities_known)
@@ -91,7 +96,7 @@ static uint64_t small_sum(const plr_filter *f) {
 static uint64_t large_sum(const plr_filter *f) {
     plr_checksum sum = {{0}};
     add(&sum, f->belief.slots, f->belief.count * sizeof *f->belief.slots);
-    add_between(&sum, f, offsetof(plr_filter, supervisor), offsetof(plr_filter, source.either));
+    ADD_BETWEEN(&sum, f, supervisor, clock_started);
     add(&sum, plr_covariance_elements(f),
         plr_covariance_size(f, f->belief.count) * sizeof(plr_real));
     for (unsigned k = 0; k < f->camera.errors.count; k++)

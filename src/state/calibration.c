@@ -45,8 +45,7 @@ static const uint8_t part_of[PLR_CALIBRATION_ERRORS] = {
     [PLR_CAMERA_CLOCK] = PLR_CALIBRATE_CLOCK,
 };
 
-void plr_calibration_lay_out(plr_parameters *par, const plr_config *config) {
-    plr_error_columns *to = &par->calibrated;
+void plr_calibration_lay_out(plr_error_columns *to, const plr_config *config) {
     plr_real variance[PLR_CALIBRATION_ERRORS];
     fill_variances(config, variance);
     memset(to, 0, sizeof *to);

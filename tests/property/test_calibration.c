@@ -164,7 +164,8 @@ static void test_a_saved_state_goes_on_with_what_was_learnt(void) {
     state_bytes_save(&state, f);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
     TEST_ASSERT_TRUE(f->camera.estimate.told[0] < 1);
-    TEST_ASSERT_EQUAL_MEMORY(&f->camera.estimate, &other.calibration, sizeof other.calibration);
+    TEST_ASSERT_EQUAL_MEMORY(&f->camera.estimate, &other.camera.estimate,
+                             sizeof other.camera.estimate);
     TEST_ASSERT_TRUE(state_bytes_same_filter(f, &other));
 }
 

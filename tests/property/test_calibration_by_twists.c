@@ -109,6 +109,7 @@ static void test_a_saved_state_goes_on_with_what_is_usual(void) {
     state_bytes_save(&state, &filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
     TEST_ASSERT_TRUE(filter.camera.estimate.excess > 2);
-    TEST_ASSERT_EQUAL_MEMORY(&filter.camera.estimate, &other.calibration, sizeof other.calibration);
+    TEST_ASSERT_EQUAL_MEMORY(&filter.camera.estimate, &other.camera.estimate,
+                             sizeof other.camera.estimate);
     TEST_ASSERT_TRUE(state_bytes_same_filter(&filter, &other));
 }

@@ -269,24 +269,25 @@ static double sigma_of(const plr_filter *f, unsigned row) {
 static void demand_agreement(void) {
     const plr_filter *f = &imu_rig.filter;
     const double near = 1e5 * eps;
-    TEST_ASSERT_EQUAL_UINT(f->belief.count, other.count);
+    TEST_ASSERT_EQUAL_UINT(f->belief.count, other.belief.count);
     TEST_ASSERT_GREATER_THAN_UINT(10, f->belief.count);
     for (unsigned i = 0; i < 9; i++) {
         const double own = i < 3 ? (double)f->belief.velocity[i] : (double)f->belief.bias[i - 3];
-        const double its = i < 3 ? (double)other.belief.velocity[i] : (double)other.bias[i - 3];
+        const double its =
+            i < 3 ? (double)other.belief.velocity[i] : (double)other.belief.bias[i - 3];
         const double sigma = sigma_of(f, VELOCITY + i);
         TEST_ASSERT_DOUBLE_WITHIN(near * sigma, own, its);
         TEST_ASSERT_DOUBLE_WITHIN(near * sigma, sigma, sigma_of(&other, VELOCITY + i));
     }
     for (unsigned slot = 0; slot < f->belief.count; slot++) {
-        TEST_ASSERT_EQUAL_UINT32(f->belief.slots[slot].id, other.slots[slot].id);
+        TEST_ASSERT_EQUAL_UINT32(f->belief.slots[slot].id, other.belief.slots[slot].id);
         const double range =
             hypot(hypot((double)f->belief.slots[slot].x[0], (double)f->belief.slots[slot].x[1]),
                   (double)f->belief.slots[slot].x[2]);
         for (unsigned i = 0; i < 3; i++) {
             const unsigned row = plr_covariance_row(f, slot) + i;
             TEST_ASSERT_DOUBLE_WITHIN(near * range * 0.01, (double)f->belief.slots[slot].x[i],
-                                      (double)other.slots[slot].x[i]);
+                                      (double)other.belief.slots[slot].x[i]);
             TEST_ASSERT_DOUBLE_WITHIN(near * sigma_of(f, row), sigma_of(f, row),
                                       sigma_of(&other, row));
         }

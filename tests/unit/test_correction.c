@@ -121,10 +121,10 @@ static void test_no_observations_change_nothing(void) {
     before = filter;
     const plr_correction correction = correct(0);
     TEST_ASSERT_EQUAL_UINT(0, correction.applied);
-    TEST_ASSERT_EQUAL_MEMORY(filter.belief.P, before.P, sizeof filter.belief.P);
-    TEST_ASSERT_EQUAL_MEMORY(filter.belief.slots, before.slots, sizeof filter.belief.slots);
-    TEST_ASSERT_EQUAL_MEMORY(filter.belief.R_WB, before.R_WB, sizeof filter.belief.R_WB);
-    TEST_ASSERT_EQUAL_MEMORY(filter.belief.p_WB, before.p_WB, sizeof filter.belief.p_WB);
+    TEST_ASSERT_EQUAL_MEMORY(filter.belief.P, before.belief.P, sizeof filter.belief.P);
+    TEST_ASSERT_EQUAL_MEMORY(filter.belief.slots, before.belief.slots, sizeof filter.belief.slots);
+    TEST_ASSERT_EQUAL_MEMORY(filter.belief.R_WB, before.belief.R_WB, sizeof filter.belief.R_WB);
+    TEST_ASSERT_EQUAL_MEMORY(filter.belief.p_WB, before.belief.p_WB, sizeof filter.belief.p_WB);
 }
 
 /* Correlates two errors of a landmark beyond 1: its variances look healthy, S cannot be factorised.
@@ -141,11 +141,11 @@ static void spoil(unsigned slot) {
 }
 
 static bool estimate_is_as_before(void) {
-    return memcmp(filter.belief.R_WB, before.R_WB, sizeof filter.belief.R_WB) == 0 &&
-           memcmp(filter.belief.p_WB, before.p_WB, sizeof filter.belief.p_WB) == 0 &&
-           memcmp(filter.belief.bias, before.bias, sizeof filter.belief.bias) == 0 &&
-           memcmp(filter.belief.slots, before.slots, sizeof filter.belief.slots) == 0 &&
-           memcmp(filter.belief.P, before.P, sizeof filter.belief.P) == 0;
+    return memcmp(filter.belief.R_WB, before.belief.R_WB, sizeof filter.belief.R_WB) == 0 &&
+           memcmp(filter.belief.p_WB, before.belief.p_WB, sizeof filter.belief.p_WB) == 0 &&
+           memcmp(filter.belief.bias, before.belief.bias, sizeof filter.belief.bias) == 0 &&
+           memcmp(filter.belief.slots, before.belief.slots, sizeof filter.belief.slots) == 0 &&
+           memcmp(filter.belief.P, before.belief.P, sizeof filter.belief.P) == 0;
 }
 
 static void test_a_block_that_cannot_be_factorised_leaves_the_estimate(void) {

@@ -236,11 +236,11 @@ static void test_a_gated_observation_moves_nothing(void) {
     rig_remember();
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(rig.report.matched, rig.report.gated);
-    TEST_ASSERT_TRUE(same_bits(rig.before.R_WB, rig.filter.belief.R_WB, 9));
-    TEST_ASSERT_EQUAL_MEMORY(rig.before.p_WB, rig.filter.belief.p_WB,
+    TEST_ASSERT_TRUE(same_bits(rig.before.belief.R_WB, rig.filter.belief.R_WB, 9));
+    TEST_ASSERT_EQUAL_MEMORY(rig.before.belief.p_WB, rig.filter.belief.p_WB,
                              sizeof rig.filter.belief.p_WB);
     const unsigned n = plr_covariance_dim(&rig.before);
-    TEST_ASSERT_TRUE(same_bits(rig.before.P, rig.filter.belief.P, n * (n + 1) / 2));
+    TEST_ASSERT_TRUE(same_bits(rig.before.belief.P, rig.filter.belief.P, n * (n + 1) / 2));
 }
 
 static void test_dead_reckoning_looks_at_nothing(void) {

@@ -64,17 +64,17 @@ static void demand_found(size_t from, size_t to) {
 static void test_every_flipped_bit_of_what_outlives_a_call_is_found(void) {
     const size_t P = offsetof(plr_filter, belief.P);
     demand_found(0, sizeof sound.magic);
-    demand_found(offsetof(plr_filter, config),
-                 offsetof(plr_filter, belief.slots) + sound.count * sizeof *sound.slots);
-    demand_found(P, P + plr_packed_row(12 + 3 * sound.count) * sizeof *sound.P);
-    demand_found(offsetof(plr_filter, supervisor), offsetof(plr_filter, source.either));
-    demand_found(offsetof(plr_filter, motion.core), sizeof sound);
+    demand_found(offsetof(plr_filter, config), offsetof(plr_filter, source.either));
+    demand_found(offsetof(plr_filter, motion), offsetof(plr_filter, belief.slots) +
+                                                   sound.belief.count * sizeof *sound.belief.slots);
+    demand_found(P, P + plr_packed_row(12 + 3 * sound.belief.count) * sizeof *sound.belief.P);
+    demand_found(offsetof(plr_filter, supervisor), sizeof sound);
 }
 
 static void test_what_no_call_looks_at_may_be_changed(void) {
     const plr_pose before = pose_of(&rig.filter);
     memset(&rig.filter.work, 0xA5, sizeof rig.filter.work);
-    memset(rig.filter.belief.slots + sound.count, 0xA5, sizeof *sound.slots);
+    memset(rig.filter.belief.slots + sound.belief.count, 0xA5, sizeof *sound.belief.slots);
     const plr_pose after = pose_of(&rig.filter);
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
     rig_drive(3);
@@ -146,7 +146,7 @@ static void test_a_damaged_pose_is_not_given_and_a_reset_mends_it(void) {
 static void test_a_count_beyond_the_slots_leads_no_call_out_of_bounds(void) {
     rig.filter.belief.count = 0x40000000;
     demand_refusals();
-    rig.filter.belief.count = sound.count;
+    rig.filter.belief.count = sound.belief.count;
     rig.filter.config.slots = 0xFFFF;
     rig.filter.totals.damaged = sound.totals.damaged;
     demand_refusals();

@@ -114,7 +114,7 @@ static void runge_kutta(double x[15], const double reading[6], double h) {
 /* T and v in body axes after the readings. */
 static void integrate(const flight *f, double T[16], double v[3]) {
     double x[15], bias[6];
-    memcpy(bias, f->belief.bias, sizeof bias);
+    memcpy(bias, f->bias, sizeof bias);
     for (int i = 0; i < 3; i++) {
         x[9 + i] = f->T[4 * i + 3];
         x[12 + i] = 0;
@@ -126,7 +126,7 @@ static void integrate(const flight *f, double T[16], double v[3]) {
     for (unsigned k = 0; k < READINGS; k++) {
         double reading[6];
         for (int i = 0; i < 6; i++)
-            reading[i] = f->source.reading[k][i] - bias[i];
+            reading[i] = f->reading[k][i] - bias[i];
         for (unsigned s = 0; s < SUBSTEPS; s++)
             runge_kutta(x, reading, tau / SUBSTEPS);
         for (int i = 0; i < 6; i++)
@@ -358,7 +358,8 @@ static double density_of_a_step(double mps2) {
         force[3 + i] = real.bias[3 + i];
     }
     to_reals(reading, force, 6);
-    held_step(&plr_process_imu, &once, once.t_ns + 2500000, reading, PLR_R(0.0025), PLR_R(0.0025));
+    held_step(&plr_process_imu, &once, once.belief.t_ns + 2500000, reading, PLR_R(0.0025),
+              PLR_R(0.0025));
     return (double)once.motion.core.Q_cc[0] / tau;
 }
 
@@ -385,13 +386,14 @@ static void test_parts_of_an_interval_add_up_to_the_whole(void) {
     plr_real reading[6];
     to_reals(reading, real.reading[0], 6);
     whole = filter;
-    held_step(&plr_process_imu, &whole, whole.t_ns + 4000000, reading, PLR_R(0.004), PLR_R(0.004));
+    held_step(&plr_process_imu, &whole, whole.belief.t_ns + 4000000, reading, PLR_R(0.004),
+              PLR_R(0.004));
     held_step(&plr_process_imu, &filter, filter.belief.t_ns + 1000000, reading, PLR_R(0.001),
               PLR_R(0.004));
     held_step(&plr_process_imu, &filter, filter.belief.t_ns + 3000000, reading, PLR_R(0.003),
               PLR_R(0.004));
     for (int i = 0; i < 3; i++) {
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, whole.p_WB[i], filter.belief.p_WB[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, whole.belief.p_WB[i], filter.belief.p_WB[i]);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, (double)whole.belief.velocity[i],
                                   (double)filter.belief.velocity[i]);
     }

@@ -140,10 +140,10 @@ static void test_the_pose_gains_what_was_allowed_and_nothing_else_changes(void) 
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, more));
     for (unsigned i = 0; i < 36; i++)
         TEST_ASSERT_DOUBLE_WITHIN(1e-5 * (fabs(P[i]) + 0.04), P[i] + P_moved[i], more[i]);
-    TEST_ASSERT_EQUAL_MEMORY(before.R_WB, filter.belief.R_WB, sizeof filter.belief.R_WB);
-    TEST_ASSERT_EQUAL_MEMORY(before.p_WB, filter.belief.p_WB, sizeof filter.belief.p_WB);
-    TEST_ASSERT_EQUAL_MEMORY(before.slots, filter.belief.slots, sizeof filter.belief.slots);
-    TEST_ASSERT_EQUAL_MEMORY(before.P, filter.belief.P, sizeof filter.belief.P);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.R_WB, filter.belief.R_WB, sizeof filter.belief.R_WB);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.p_WB, filter.belief.p_WB, sizeof filter.belief.p_WB);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.slots, filter.belief.slots, sizeof filter.belief.slots);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.P, filter.belief.P, sizeof filter.belief.P);
     TEST_ASSERT_EQUAL_MEMORY(&before.totals, &filter.totals, sizeof filter.totals);
 }
 

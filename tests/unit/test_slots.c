@@ -144,7 +144,7 @@ static void test_removal_leaves_the_marginal_of_the_others(void) {
                 TEST_ASSERT_EQUAL_UINT16(PLR_NO_SLOT, to);
                 continue;
             }
-            TEST_ASSERT_EQUAL_MEMORY(&before.slots[from], &filter.belief.slots[to],
+            TEST_ASSERT_EQUAL_MEMORY(&before.belief.slots[from], &filter.belief.slots[to],
                                      sizeof(plr_slot));
             plr_landmark was, is;
             plr_slots_export(&before, from, &was); /* its place and its block, with the pose's */
