@@ -60,6 +60,7 @@ typedef struct plr_layout {
         uint8_t row, size; /* size 0: not estimated */
     } block[PLR_BLOCKS];
     uint8_t core;            /* rows of all blocks: the first landmark's row */
+    uint8_t errors;          /* of the calibration: columns of S */
     uint8_t driver, drivers; /* first and number of the rows that a motion depends on: the biases of
                                 twists; with an IMU theta, velocity and biases */
 } plr_layout;
@@ -237,7 +238,8 @@ typedef struct plr_camera_model {
     plr_real track_drift_variance;   /* by which tracks wander in a second, px^2/s */
     plr_real min_disparity, max_row_gap;
     plr_real min_depth, max_depth, min_inverse_range;
-    plr_real landmark_variance;
+    plr_real landmark_variance; /* of a new landmark, m^2; 0: by the pixels' */
+    uint8_t landmark_prior;     /* plr_landmark_prior, of a new landmark in `world` */
     plr_error_columns errors;
     plr_camera_estimate estimate;
 } plr_camera_model;
@@ -252,6 +254,10 @@ typedef struct plr_source {
     plr_real accel_density, gyro_density; /* of an IMU: variance times the seconds of a reading */
     plr_real accel_walk_variance, gyro_walk_variance; /* of an IMU: what a second adds */
     plr_real start_velocity_variance;
+    plr_real gate_d2;        /* of a velocity beside a reading */
+    uint8_t process;         /* plr_process_kind: of the table of processes */
+    uint8_t timing, noise;   /* plr_twist_timing; of twists plr_noise_kind */
+    uint8_t poses_are_given; /* 1: in mapping, where no reading moves the pose */
 
     plr_time_ns reading_ns;         /* of the last twist or IMU reading */
     plr_real interval_s;            /* between the last two of them */
@@ -271,8 +277,9 @@ typedef struct plr_source {
 
 /* What is believed of body and landmarks: the state with its covariance. */
 typedef struct plr_belief {
-    plr_layout layout; /* it and the model never change after init */
+    plr_layout layout; /* layout, model and capacity never change after init */
     uint8_t model;     /* plr_model_kind: of the table of models */
+    uint16_t capacity; /* slots, by the setting of that name */
 
     unsigned count;   /* active slots, dense from 0 */
     plr_time_ns t_ns; /* of the estimate */

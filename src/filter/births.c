@@ -15,10 +15,11 @@ bool plr_births_are_allowed(const plr_filter *f) {
 
 /* Initialises a landmark. A slot must be free, and plr_stereo_makes_landmark true. */
 static void append_new(plr_filter *f, const plr_observation *seen) {
-    PLR_ASSERT(f->belief.count < PLR_MAX_LANDMARKS && plr_stereo_makes_landmark(f, seen));
+    PLR_ASSERT(f->belief.count < PLR_MAX_LANDMARKS &&
+               plr_stereo_makes_landmark(&f->belief, &f->camera, seen));
     plr_new_landmark landmark;
-    const plr_real beyond = plr_stereo_initialise(f, seen, &landmark);
-    plr_slots_append(f, seen->id, false, &landmark);
+    const plr_real beyond = plr_stereo_initialise(&f->belief, &f->camera, seen, &landmark);
+    plr_slots_append(&f->belief, seen->id, false, &landmark);
     f->belief.slots[f->belief.count - 1].beyond = beyond;
 }
 
@@ -61,11 +62,13 @@ static void choose_births(const plr_filter *f, const plr_sightings *sightings,
         const plr_observation *o = sightings->at[k].seen;
         const unsigned cell = cell_of(f, o);
         const bool matched = plr_is_matched(&sightings->at[k]);
-        fate[k] = (uint8_t)(matched ? MATCHED : plr_stereo_makes_landmark(f, o) ? cell : POOR);
+        fate[k] = (uint8_t)(matched                                                ? MATCHED
+                            : plr_stereo_makes_landmark(&f->belief, &f->camera, o) ? cell
+                                                                                   : POOR);
         cells[cell].seen += fate[k] != POOR;
         cells[cell].followed += matched;
     }
-    for (unsigned room = plr_slots_room(f); room > 0; room--) {
+    for (unsigned room = plr_slots_room(&f->belief); room > 0; room--) {
         unsigned next = n;
         for (unsigned k = 0; k < n; k++)
             if (fate[k] < CELLS && (next == n || is_behind(&cells[fate[k]], &cells[fate[next]])))
@@ -90,7 +93,8 @@ void plr_births_from_unmatched(plr_filter *f, const plr_sightings *sightings, bo
         plr_landmark known;
         if (plr_is_matched(&sightings->at[k]))
             continue;
-        if (makes && events->left_out && plr_map_is_asked(f) && plr_map_ask(f, o->id, &known)) {
+        if (makes && events->left_out && plr_map_is_asked(&f->config, &f->map) &&
+            plr_map_ask(&f->map, o->id, &known)) {
             report->poor++; /* it keeps its place in the map, and is asked for again */
             continue;
         }
@@ -98,7 +102,8 @@ void plr_births_from_unmatched(plr_filter *f, const plr_sightings *sightings, bo
             report->poor++;
             continue;
         }
-        if (fate[k] != BORN || !plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
+        if (fate[k] != BORN || !plr_slots_make_room(&f->belief, &f->camera, &f->motion, &f->map,
+                                                    &report->evicted, &events->sink_failed)) {
             report->no_room++;
             continue;
         }
@@ -113,10 +118,10 @@ void plr_births_drop_rejected(plr_filter *f, plr_sightings *sightings) {
     for (unsigned k = 0; k < sightings->count; k++) {
         const plr_sighting *row = &sightings->at[k];
         if (plr_is_matched(row) && !plr_gate_accepted(row))
-            plr_slots_remove(f, plr_slots_find(f, row->seen->id));
+            plr_slots_remove(&f->belief, plr_slots_find(&f->belief, row->seen->id));
     }
     for (unsigned k = 0; k < sightings->count; k++)
-        sightings->at[k].slot = plr_slots_find(f, sightings->at[k].seen->id);
+        sightings->at[k].slot = plr_slots_find(&f->belief, sightings->at[k].seen->id);
 }
 
 plr_status plr_births_restart(plr_filter *f, const plr_sightings *sightings,
@@ -129,18 +134,18 @@ plr_status plr_births_restart(plr_filter *f, const plr_sightings *sightings,
         if (!plr_is_matched(row) || plr_gate_accepted(row))
             continue;
         const unsigned slot =
-            plr_slots_find(f, row->seen->id); /* a restart may have moved others */
+            plr_slots_find(&f->belief, row->seen->id); /* a restart may have moved others */
         const plr_slot before = f->belief.slots[slot];
         const bool lost = row->verdict == PLR_GATE_LOST;
         if (!lost && !(agrees && plr_track_may_restart(&before)))
             continue;
-        const bool makes = plr_stereo_makes_landmark(f, row->seen);
+        const bool makes = plr_stereo_makes_landmark(&f->belief, &f->camera, row->seen);
         if (!lost && !makes)
             continue;
         const plr_status status = plr_predict_apply_prior(f);
         if (status != PLR_OK)
             return status;
-        plr_slots_remove(f, slot);
+        plr_slots_remove(&f->belief, slot);
         if (!makes)
             continue;
         append_new(f, row->seen);

@@ -11,8 +11,8 @@
 /* Not with an IMU, whose biases, velocity and tilt are found together after a start in motion; nor
  * if another sensor has told of the biases since the last frame. */
 static bool may_be_considered(const plr_filter *f) {
-    return plr_has_block(f, PLR_BLOCK_BIAS) && !plr_has_block(f, PLR_BLOCK_VELOCITY) &&
-           !plr_velocity_informs_bias(f);
+    return plr_has_block(&f->belief, PLR_BLOCK_BIAS) &&
+           !plr_has_block(&f->belief, PLR_BLOCK_VELOCITY) && !plr_velocity_informs_bias(&f->source);
 }
 
 void plr_bias_consider(plr_filter *f, bool hold, plr_considered_bias *before) {
@@ -22,9 +22,9 @@ void plr_bias_consider(plr_filter *f, bool hold, plr_considered_bias *before) {
     f->camera.estimate.moves = 0; /* nor is anything learnt of it */
     before->seconds = f->motion.seconds;
     memcpy(before->bias, f->belief.bias, sizeof before->bias);
-    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);
+    plr_covariance_get(&f->belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);
     for (unsigned k = 0; k < f->camera.errors.count; k++)
-        memcpy(before->S_b[k], f->belief.S[k] + plr_row_of(f, PLR_BLOCK_BIAS),
+        memcpy(before->S_b[k], f->belief.S[k] + plr_row_of(&f->belief, PLR_BLOCK_BIAS),
                sizeof before->S_b[k]);
 }
 
@@ -34,11 +34,11 @@ void plr_bias_restore(plr_filter *f, const plr_considered_bias *before) {
         return;
     memcpy(f->belief.bias, before->bias, sizeof before->bias);
     for (unsigned k = 0; k < f->camera.errors.count; k++)
-        memcpy(f->belief.S[k] + plr_row_of(f, PLR_BLOCK_BIAS), before->S_b[k],
+        memcpy(f->belief.S[k] + plr_row_of(&f->belief, PLR_BLOCK_BIAS), before->S_b[k],
                sizeof before->S_b[k]);
-    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, lost);
+    plr_covariance_get(&f->belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, lost);
     for (unsigned i = 0; i < PLR_BIAS_DIM * PLR_BIAS_DIM; i++)
         lost[i] = before->P_bb[i] - lost[i];
-    plr_covariance_add(f, PLR_BLOCK_BIAS, lost);
-    plr_process_of(f)->walk(f, before->seconds);
+    plr_covariance_add(&f->belief, PLR_BLOCK_BIAS, lost);
+    plr_process_walk(&f->belief, &f->source, before->seconds);
 }

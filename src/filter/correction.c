@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "filter/filter_internal.h"
 #include "math/dense.h"
 #include "math/log_product.h"
 #include "math/small.h"
@@ -90,12 +91,12 @@ static unsigned next_slot(plr_sensed *sensed) {
 static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsigned i,
                             unsigned slot, plr_measurement *m) {
     if (i < sensed->seen) {
-        plr_measurement_recall(f, slot, m);
+        plr_measurement_recall(&f->belief, &f->work, slot, m);
     } else if (i < sensed->count) {
         *m = sensed->given[i - sensed->seen];
     } else {
         memset(m, 0, sizeof *m);
-        plr_velocity_bias_rows(f, i - sensed->count, &m->H, m->r);
+        plr_velocity_bias_rows(&f->belief, &f->source, i - sensed->count, &m->H, m->r);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             m->R[r] = 1;
     }
@@ -117,7 +118,7 @@ static void stack_sensitivity(const plr_filter *f, bool seen, unsigned slot, con
     plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS], column[PLR_ROWS];
     memset(H_s, 0, f->camera.errors.count * sizeof *H_s);
     if (seen && f->camera.errors.count > 0)
-        plr_stereo_by_calibration(f, slot, H_s);
+        plr_stereo_by_calibration(&f->belief, &f->camera, slot, H_s);
     for (unsigned k = 0; OF_S + k < whole_tiles(f); k++) {
         const bool has_column = k < f->camera.errors.count;
         if (has_column)
@@ -133,7 +134,7 @@ static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_b
     plr_workspace *w = &f->work;
     PLR_ASSERT(first + PLR_ROWS <= batch->rows);
     plr_real column[PLR_ROWS];
-    plr_covariance_project(f, &m->H, w->Vt + first * batch->ld, batch->ld);
+    plr_covariance_project(&f->belief, &m->H, w->Vt + first * batch->ld, batch->ld);
     plr_real *S = batch->S + first; /* element (i, first) */
     for (unsigned i = 0; i < first; i++) {
         plr_rows_apply(&m->H, w->Vt + i * batch->ld, S);
@@ -250,7 +251,7 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
         return false;
     plr_solve_upper_transposed(batch->rows, batch->ld, batch->S, w->Vt, batch->ld);
     plr_solve_upper_transposed(batch->rows, whole_tiles(f), batch->S, batch->E, WIDE);
-    if (!plr_covariance_subtract(f, batch->rows))
+    if (!plr_covariance_subtract(&f->belief, f->work.Vt, batch->rows))
         return false;
     if (w->noise.open)
         add_noise_information(f, batch);
@@ -267,7 +268,7 @@ static plr_status correct_by_batch(plr_filter *f, plr_sensed *sensed, unsigned a
     plr_batch batch; /* not initialised: that would cost as much as a row of S */
     bool factorised;
     batch.rows = PLR_ROWS * size;
-    batch.ld = plr_covariance_ld(f);
+    batch.ld = plr_covariance_ld(&f->belief);
     for (unsigned i = 0; i < size; i++) {
         plr_measurement m;
         const bool seen = at + i < sensed->seen;
@@ -298,28 +299,29 @@ static bool is_applicable(const plr_filter *f, unsigned n) {
 
 /* Corrects the estimate by work.dx, and P with it. *cut: as in plr_correction. */
 static plr_status move_estimate(plr_filter *f, unsigned n, unsigned *cut) {
-    PLR_ASSERT(n == plr_covariance_dim(f));
+    PLR_ASSERT(n == plr_covariance_dim(&f->belief));
     *cut = 0;
     if (!is_applicable(f, n))
         return plr_filter_diverge(f);
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
+    if (plr_has_block(&f->belief, PLR_BLOCK_BIAS))
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-            f->belief.bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+            f->belief.bias[i] += f->work.dx[plr_row_of(&f->belief, PLR_BLOCK_BIAS) + i];
+    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY))
         for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
-            f->belief.velocity[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_VELOCITY) + i];
-    plr_velocity_forget_bias(f);
-    *cut = plr_model_of(f)->retract(f, f->work.dx);
-    plr_pose_correct(f, f->work.dx);
-    plr_covariance_make_up_for_rounding(f);
-    return plr_covariance_is_positive(f) ? PLR_OK : plr_filter_diverge(f);
+            f->belief.velocity[i] += f->work.dx[plr_row_of(&f->belief, PLR_BLOCK_VELOCITY) + i];
+    plr_velocity_forget_bias(&f->source);
+    *cut = plr_model_of(&f->belief)->retract(&f->belief, &f->camera, &f->work, f->work.dx);
+    plr_pose_correct(&f->belief, f->work.dx);
+    plr_covariance_make_up_for_rounding(&f->belief);
+    return plr_covariance_is_positive(&f->belief) ? PLR_OK : plr_filter_diverge(f);
 }
 
 /* Applies all measurements, in batches of like size: the cost grows with its square. Those after one that
  * diverges are left out. */
 static plr_status correct_by_all(plr_filter *f, plr_sensed *sensed, plr_correction *result,
                                  plr_likelihood *likelihood) {
-    const unsigned all = sensed->count + (plr_velocity_informs_bias(f) ? BIAS_MEASUREMENTS : 0);
+    const unsigned all =
+        sensed->count + (plr_velocity_informs_bias(&f->source) ? BIAS_MEASUREMENTS : 0);
     unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
     plr_status status = PLR_OK;
     for (; batches > 0 && status == PLR_OK; batches--) {
@@ -347,20 +349,20 @@ static unsigned count_used(const plr_sightings *frame) {
 plr_correction plr_correct(plr_filter *f, const plr_sightings *frame, const plr_measurement *given,
                            unsigned count) {
     plr_correction result = {.status = PLR_OK};
-    const unsigned seen = count_used(frame), n = plr_covariance_dim(f);
+    const unsigned seen = count_used(frame), n = plr_covariance_dim(&f->belief);
     plr_sensed sensed = {frame, 0, seen, seen + count, given};
     if (!f->work.noise.open) { /* no motion has been applied */
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
         memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     }
-    plr_calibration_begin(f);
+    plr_calibration_begin(&f->camera, &f->work.learnt);
     plr_likelihood likelihood = {.det_root = {1, 0}};
-    const bool informed = plr_velocity_informs_bias(f);
+    const bool informed = plr_velocity_informs_bias(&f->source);
     result.status = correct_by_all(f, &sensed, &result, &likelihood);
     result.moved = f->work.noise.open;
     memcpy(result.Lambda, f->work.noise.Lambda, sizeof result.Lambda);
-    result.status = first_of(result.status, plr_covariance_close_noise(f, result.nu));
-    plr_calibration_learn(f);
+    result.status = first_of(result.status, plr_filter_close_noise(f, result.nu));
+    plr_calibration_learn(&f->belief, &f->camera, &f->work);
     if (result.moved)
         add_likelihood_of_motion(&likelihood, &f->work.noise, result.nu);
     result.innovation.d2 = likelihood.d2;
@@ -373,9 +375,9 @@ plr_correction plr_correct(plr_filter *f, const plr_sightings *frame, const plr_
 }
 
 plr_status plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
-    const unsigned n = plr_covariance_dim(f);
+    const unsigned n = plr_covariance_dim(&f->belief);
     unsigned cut;
-    if (!plr_covariance_shift(f, xi, f->work.dx))
+    if (!plr_covariance_shift(&f->belief, xi, f->work.dx))
         return PLR_OK;
     memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     return move_estimate(f, n, &cut);

@@ -36,7 +36,7 @@ void plr_evidence_of_picture(plr_filter *f, const plr_sightings *sightings) {
         const plr_sighting *row = &sightings->at[k];
         if (!plr_is_matched(row))
             continue;
-        plr_slot *slot = plr_slot_of(f, row);
+        plr_slot *slot = plr_slot_of(&f->belief, row);
         const uint32_t hash = hash_of_pixels(row->seen);
         e->matched++;
         e->same += slot->pixel_hash == hash;
@@ -63,18 +63,18 @@ void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
     plr_mat6_vec(e->nu, first->motion.L, correction->nu);
     plr_motion_solve(stated->L, 1, e->nu, 1);
     memcpy(e->Lambda, correction->Lambda, sizeof e->Lambda);
-    plr_pose_moved_from(f, by_odometry->R_WB, by_odometry->p_WB, e->moved);
+    plr_pose_moved_from(&f->belief, by_odometry->R_WB, by_odometry->p_WB, e->moved);
 }
 
 bool plr_evidence_before_map(plr_filter *f, const plr_sightings *sightings,
                              plr_evidence_pose *before) {
     plr_map_evidence *e = &f->work.evidence.map;
     for (unsigned k = 0; k < sightings->count; k++)
-        e->known += plr_is_of_known(f, &sightings->at[k]);
+        e->known += plr_is_of_known(&f->belief, &sightings->at[k]);
     if (e->known == 0 || f->config.model != PLR_MODEL_BODY)
         return false;
     plr_evidence_note_pose(f, before);
-    plr_motion_pose_covariance(f, e->P_before);
+    plr_motion_pose_covariance(&f->belief, &f->motion, e->P_before);
     return true;
 }
 
@@ -82,20 +82,20 @@ void plr_evidence_after_map(plr_filter *f, const plr_evidence_pose *before) {
     plr_map_evidence *e = &f->work.evidence.map;
     e->adopted = f->work.evidence.events.adopted;
     memcpy(e->R_WB, f->belief.R_WB, sizeof e->R_WB);
-    plr_pose_moved_from(f, before->R_WB, before->p_WB, e->moved);
-    plr_motion_pose_covariance(f, e->P_after);
-    plr_sensitivity_add_to_pose(f, e->calibration);
+    plr_pose_moved_from(&f->belief, before->R_WB, before->p_WB, e->moved);
+    plr_motion_pose_covariance(&f->belief, &f->motion, e->P_after);
+    plr_sensitivity_add_to_pose(&f->belief, &f->camera, &f->motion, e->calibration);
 }
 
 static void add_biases(plr_filter *f, plr_bias_evidence *e) {
     plr_real P[PLR_POSE_SQUARE];
-    e->estimated = plr_has_block(f, PLR_BLOCK_BIAS);
+    e->estimated = plr_has_block(&f->belief, PLR_BLOCK_BIAS);
     if (!e->estimated)
         return;
-    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
+    plr_covariance_get(&f->belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
         e->off[k] = f->belief.bias[k] - f->source.bias_prior[k];
-        e->prior[k] = plr_bias_prior_variance(f, k);
+        e->prior[k] = plr_bias_prior_variance(&f->source, k);
         e->variance[k] = P[(PLR_BIAS_DIM + 1) * k];
     }
 }
@@ -104,9 +104,9 @@ void plr_evidence_complete(plr_filter *f, plr_sightings *sightings) {
     plr_frame_evidence *e = &f->work.evidence;
     for (unsigned k = 0; k < sightings->count; k++)
         if (plr_gate_rejected(&sightings->at[k]))
-            sightings->at[k].slot = plr_slots_find(f, sightings->at[k].seen->id);
+            sightings->at[k].slot = plr_slots_find(&f->belief, sightings->at[k].seen->id);
     add_biases(f, &e->bias);
-    e->events.miscalibrated = plr_calibration_is_off(f);
+    e->events.miscalibrated = plr_calibration_is_off(&f->camera);
     e->has_gate = f->par.gate_d2 > 0 || f->par.gate_residual2 > 0;
     e->readings = plr_filter_readings_at(f, f->belief.t_ns);
 }

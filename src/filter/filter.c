@@ -69,6 +69,7 @@ static void set_camera_model(plr_camera_model *camera, const plr_calibration *ca
     camera->max_depth = (plr_real)c->max_depth_m;
     camera->min_inverse_range = (plr_real)(1 / c->max_range_m);
     camera->landmark_variance = squared(c->landmark_sigma_m);
+    camera->landmark_prior = c->landmark_prior;
     plr_calibration_lay_out(&camera->errors, c);
 }
 
@@ -85,6 +86,11 @@ static void set_source(plr_source *source, const plr_config *c) {
     source->accel_walk_variance = squared(c->accel_walk);
     source->gyro_walk_variance = squared(c->gyro_walk);
     source->start_velocity_variance = squared(c->start_velocity_sigma_mps);
+    source->gate_d2 = (plr_real)c->gate_d2;
+    source->process = c->process;
+    source->timing = c->process == PLR_PROCESS_IMU ? c->imu_timing : c->twist_timing;
+    source->noise = c->noise;
+    source->poses_are_given = c->mode == PLR_MODE_MAPPING;
 }
 
 /* All that init derives from settings and calibration. */
@@ -94,6 +100,9 @@ static void set_constants(plr_filter *f, const plr_calibration *calibration, con
     f->par.max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
     set_camera_model(&f->camera, calibration, c);
     set_source(&f->source, c);
+    f->belief.model = c->model;
+    f->belief.capacity = c->slots;
+    f->belief.layout.errors = f->camera.errors.count;
     plr_extrinsics_set(f, c);
     plr_se3_adjoint(f->camera.Ad_CB, f->camera.given.R_CB, f->camera.given.t_CB);
 }
@@ -122,9 +131,8 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
     f->config = *config;
     if (map)
         f->map = *map;
-    f->belief.model = config->model;
     set_constants(f, calibration, config);
-    plr_process_of(f)->lay_out(f);
+    plr_process_of(&f->source)->lay_out(&f->belief, &f->config);
     f->magic = PLR_FILTER_MAGIC;
     plr_guard_seal_constant(f);
     return plr_filter_reset(f);
@@ -139,15 +147,15 @@ static void start_covariance(const plr_filter *f, double P_xi[PLR_POSE_SQUARE]) 
 }
 
 void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
-    plr_velocity_forget_bias(f);
-    plr_covariance_begin_diagonal(f, PLR_BLOCK_BIAS, variance);
+    plr_velocity_forget_bias(&f->source);
+    plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_BIAS, variance);
 }
 
 void plr_filter_begin_velocity(plr_filter *f) {
     const double v = (double)f->source.start_velocity_variance;
     const double variance[PLR_VELOCITY_DIM] = {v, v, v};
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
-        plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, variance);
+    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY))
+        plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_VELOCITY, variance);
 }
 
 static void set_bias_prior(plr_filter *f, const double mean[PLR_POSE_DIM],
@@ -188,10 +196,10 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(&f->totals, 0, sizeof f->totals);
     plr_mat3_identity(f->belief.R_WB);
     memset(&f->motion.core, 0, sizeof f->motion.core);
-    plr_calibration_reset(f);
-    plr_motion_clear(f);
-    plr_velocity_forget(f);
-    plr_alignment_clear(f);
+    plr_calibration_reset(&f->camera);
+    plr_motion_clear(&f->belief, &f->motion);
+    plr_velocity_forget(&f->belief, &f->source);
+    plr_alignment_clear(&f->belief, &f->source);
     f->belief.count = 0;
     f->belief.frame_number = 0;
     f->frames_off_the_map = 0;
@@ -199,10 +207,10 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(f->source.bias_prior, 0, sizeof f->source.bias_prior);
     f->source.bias_walked_s = 0;
     start_covariance(f, P_xi);
-    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
+    plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_xi);
     plr_filter_store_for_recovery(f);
     plr_filter_begin_velocity(f);
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
+    if (plr_has_block(&f->belief, PLR_BLOCK_BIAS))
         start_bias(f);
     plr_guard_seal_whole(f);
     return PLR_OK;
@@ -211,10 +219,10 @@ plr_status plr_filter_reset(plr_filter *f) {
 /* ---------------------------------------------------------------- set by the caller */
 
 void plr_filter_forget_reading(plr_filter *f) {
-    plr_velocity_forget(f);
+    plr_velocity_forget(&f->belief, &f->source);
     f->source.reading_valid = 0;
     f->source.interval_s = 0;
-    plr_process_of(f)->rest(f, f->source.reading);
+    plr_process_of(&f->source)->rest(&f->belief, &f->source, f->source.reading);
 }
 
 plr_status plr_filter_refuse(plr_filter *f, plr_status status) {
@@ -272,19 +280,19 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     plr_extrinsics_pose_in(f, &at);
     plr_extrinsics_covariance_in(f, P_start);
     plr_predict_drop(f);
-    plr_alignment_follow_clock(f, t_ns);
+    plr_alignment_follow_clock(&f->belief, &f->source, t_ns);
     if (f->clock_started)
         f->totals.resets++;
     f->belief.count = 0;
-    plr_covariance_begin(f, PLR_BLOCK_POSE, P_start);
+    plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_start);
     store_pose(f, t_ns, &at);
     f->source.inertial.pose_given = 1;
     if (P_xi)
-        plr_alignment_keep_world(f);
+        plr_alignment_keep_world(&f->source);
     plr_supervise_pose_set(&f->supervisor);
     plr_filter_store_for_recovery(f);
     f->frames_off_the_map = 0;
-    if (!plr_covariance_is_positive(f)) /* the biases are lost too */
+    if (!plr_covariance_is_positive(&f->belief)) /* the biases are lost too */
         plr_filter_begin_prior_bias(f, 0);
     /* readings and frames of another clock are not used any more */
     if (f->source.reading_ns > t_ns || t_ns - f->source.reading_ns > f->par.max_gap_ns)
@@ -300,8 +308,8 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
     const plr_status sound = mean && variance ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (!plr_has_block(f, PLR_BLOCK_BIAS) || f->totals.twists > 0 || f->totals.frames > 0 ||
-        f->config.mode == PLR_MODE_MAPPING)
+    if (!plr_has_block(&f->belief, PLR_BLOCK_BIAS) || f->totals.twists > 0 ||
+        f->totals.frames > 0 || f->config.mode == PLR_MODE_MAPPING)
         return plr_filter_refuse(f, PLR_E_MODE);
     if (!plr_all_finite(mean, PLR_POSE_DIM) || !plr_all_finite(variance, PLR_POSE_DIM))
         return plr_filter_refuse(f, PLR_E_NOT_FINITE);
@@ -337,7 +345,7 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     }
     plr_real R[9];
     get_rotation(R, &at);
-    plr_motion_jump(f, t_ns, R, at.p);
+    plr_motion_jump(&f->belief, &f->motion, t_ns, R, at.p);
     plr_guard_seal(f);
     return PLR_OK;
 }
@@ -355,7 +363,7 @@ plr_readings_evidence plr_filter_readings_at(const plr_filter *f, plr_time_ns no
                                    .looks = f->config.mode != PLR_MODE_DEAD_RECKONING,
                                    .imu = imu,
                                    .started = !imu || f->source.inertial.started,
-                                   .unsettled = imu && plr_alignment_is_unsettled(f),
+                                   .unsettled = imu && plr_alignment_is_unsettled(&f->source),
                                    .fault_of_start = fault > PLR_IMU_FAULT_MOVES &&
                                                      fault < PLR_IMU_FAULT_SATURATED,
                                    .fault_of_reading = fault >= PLR_IMU_FAULT_SATURATED,

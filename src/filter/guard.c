@@ -78,13 +78,13 @@ static uint64_t constant_sum(const plr_filter *f) {
 }
 
 static uint64_t small_sum(const plr_filter *f) {
-    const size_t used = plr_covariance_size(f, f->belief.count);
+    const size_t used = plr_covariance_size(&f->belief, f->belief.count);
     plr_checksum sum = {{0}};
     ADD_BETWEEN(&sum, f, camera.estimate, source);
     ADD_BETWEEN(&sum, f, source.reading_ns, source.either);
     ADD_BETWEEN(&sum, f, motion, belief);
     ADD_BETWEEN(&sum, f, belief.count, belief.slots);
-    add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
+    add(&sum, plr_covariance_elements(&f->belief), (used < HEAD ? used : HEAD) * sizeof(plr_real));
     ADD_BETWEEN(&sum, f, clock_started, guard);
     if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
         add(&sum, &f->source.either.alignment, sizeof f->source.either.alignment);
@@ -97,10 +97,10 @@ static uint64_t large_sum(const plr_filter *f) {
     plr_checksum sum = {{0}};
     add(&sum, f->belief.slots, f->belief.count * sizeof *f->belief.slots);
     ADD_BETWEEN(&sum, f, supervisor, clock_started);
-    add(&sum, plr_covariance_elements(f),
-        plr_covariance_size(f, f->belief.count) * sizeof(plr_real));
+    add(&sum, plr_covariance_elements(&f->belief),
+        plr_covariance_size(&f->belief, f->belief.count) * sizeof(plr_real));
     for (unsigned k = 0; k < f->camera.errors.count; k++)
-        add(&sum, f->belief.S[k], plr_covariance_dim(f) * sizeof *f->belief.S[k]);
+        add(&sum, f->belief.S[k], plr_covariance_dim(&f->belief) * sizeof *f->belief.S[k]);
     return mixed(&sum);
 }
 

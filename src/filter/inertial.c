@@ -94,15 +94,15 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     if (planned.status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
         return plr_predict_accept(f, t_ns, reading, &planned);
     plr_real change2[2];
-    plr_statistics_change(f, reading, change2);
+    plr_statistics_change(&f->source, reading, change2);
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    plr_statistics_learn(f, t_ns, reading, planned.step.interval, change2);
-    plr_calibration_note_rate(f, reading + 3);
+    plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
+    plr_calibration_note_rate(&f->camera, &f->source, reading + 3);
     if (f->source.inertial.started)
         return plr_predict_accept(f, t_ns, reading, &planned);
-    plr_alignment_add(f, t_ns, reading);
+    plr_alignment_add(&f->belief, &f->source, &f->config, t_ns, reading);
     if (f->source.inertial.started)
         plr_filter_store_for_recovery(f);
     const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
@@ -180,8 +180,8 @@ void plr_filter_watch_start(plr_filter *f, const plr_sightings *sightings) {
         2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
     f->source.either.alignment.seen_to_move = 1;
-    plr_alignment_restart(f);
-    plr_alignment_does_not_stand(f, PLR_IMU_FAULT_MOVES);
+    plr_alignment_restart(&f->source);
+    plr_alignment_does_not_stand(&f->source, PLR_IMU_FAULT_MOVES);
 }
 
 void plr_filter_follow_start(plr_filter *f, const plr_report *report) {
@@ -190,8 +190,8 @@ void plr_filter_follow_start(plr_filter *f, const plr_report *report) {
     f->source.inertial.frames =
         (uint16_t)(f->source.inertial.frames +
                    (report->used > 0 && f->source.inertial.frames < UINT16_MAX));
-    plr_alignment_anchor(f);
-    plr_alignment_watch_gravity(f);
+    plr_alignment_anchor(&f->belief, &f->motion, &f->source, &f->config);
+    plr_alignment_watch_gravity(&f->belief, &f->source);
 }
 
 plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
@@ -213,7 +213,7 @@ plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
         v[i] = (plr_real)v_B_mps[i];
         P_v[i] = (plr_real)variance[i];
     }
-    plr_alignment_given(f, v, P_v);
+    plr_alignment_given(&f->belief, &f->source, v, P_v);
     plr_filter_store_for_recovery(f);
     plr_guard_seal_whole(f);
     return PLR_OK;

@@ -19,7 +19,7 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
     if (slot >= f->belief.count)
         return PLR_E_ARGUMENT;
     plr_landmark found;
-    if (!plr_slots_export(f, slot, &found))
+    if (!plr_slots_export(&f->belief, &f->camera, &f->motion, slot, &found))
         return PLR_E_DIVERGED;
     *landmark = found;
     return PLR_OK;
@@ -36,17 +36,17 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
         return PLR_E_RANGE;
     if (!plr_is_place(landmark->p_W_m, landmark->P_W_m2))
         return PLR_E_ARGUMENT;
-    if (!plr_process_has_started(f)) /* the start turns the pose, by which it comes in */
+    if (!plr_process_has_started(&f->source)) /* the start turns the pose, by which it comes in */
         return PLR_E_NOT_READY;
-    if (plr_slots_find(f, landmark->id) != PLR_NO_SLOT)
+    if (plr_slots_find(&f->belief, landmark->id) != PLR_NO_SLOT)
         return PLR_E_EXISTS;
     if (f->belief.count >= f->config.slots)
         return PLR_E_FULL;
     plr_new_landmark entering;
-    if (!plr_model_of(f)->adopt(f, landmark, &entering))
+    if (!plr_model_of(&f->belief)->adopt(&f->belief, &f->camera, &f->motion, landmark, &entering))
         return PLR_E_RANGE;
-    plr_slots_append(f, landmark->id, true, &entering);
-    plr_alignment_keep_world(f);
+    plr_slots_append(&f->belief, landmark->id, true, &entering);
+    plr_alignment_keep_world(&f->source);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }
@@ -59,8 +59,9 @@ plr_status plr_filter_flush_map(plr_filter *f) {
         return PLR_E_MODE;
     for (unsigned slot = f->belief.count; slot-- > 0;) { /* backwards: removing moves the last */
         plr_landmark landmark;
-        if (!plr_slots_export(f, slot, &landmark) || f->map.sink(f->map.context, &landmark) == 0)
-            plr_slots_remove(f, slot);
+        if (!plr_slots_export(&f->belief, &f->camera, &f->motion, slot, &landmark) ||
+            f->map.sink(f->map.context, &landmark) == 0)
+            plr_slots_remove(&f->belief, slot);
     }
     plr_guard_seal_whole(f);
     return f->belief.count == 0 ? PLR_OK : PLR_E_IO;

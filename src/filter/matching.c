@@ -90,7 +90,7 @@ void plr_match_count(plr_filter *f, const plr_sightings *sightings) {
     for (unsigned k = 0; k < sightings->count; k++) {
         if (!plr_is_matched(&sightings->at[k]))
             continue;
-        plr_slot *slot = plr_slot_of(f, &sightings->at[k]);
+        plr_slot *slot = plr_slot_of(&f->belief, &sightings->at[k]);
         slot->times_seen++;
         slot->last_seen_ns = f->belief.t_ns;
     }
@@ -99,24 +99,26 @@ void plr_match_count(plr_filter *f, const plr_sightings *sightings) {
 void plr_match_known(plr_filter *f, plr_sightings *sightings, plr_frame_events *events,
                      plr_report *report) {
     const bool alone = f->config.mode == PLR_MODE_LOCALIZATION;
-    if (!plr_map_is_asked(f))
+    if (!plr_map_is_asked(&f->config, &f->map))
         return;
     unsigned before = report->created;
     for (unsigned k = 0; k < sightings->count; k++) {
         const plr_sighting *row = &sightings->at[k];
         plr_landmark known;
         plr_new_landmark landmark;
-        if (plr_is_matched(row) || !plr_map_ask(f, row->seen->id, &known))
+        if (plr_is_matched(row) || !plr_map_ask(&f->map, row->seen->id, &known))
             continue;
-        if (!plr_model_of(f)->adopt(f, &known, &landmark)) {
+        if (!plr_model_of(&f->belief)
+                 ->adopt(&f->belief, &f->camera, &f->motion, &known, &landmark)) {
             events->unplaced++;
             continue;
         }
-        if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
+        if (!plr_slots_make_room(&f->belief, &f->camera, &f->motion, &f->map, &report->evicted,
+                                 &events->sink_failed)) {
             report->no_room = (uint16_t)(report->no_room + alone);
             continue;
         }
-        plr_slots_append(f, row->seen->id, true, &landmark);
+        plr_slots_append(&f->belief, row->seen->id, true, &landmark);
         report->created++;
     }
     events->adopted = report->created - before;

@@ -54,7 +54,7 @@ static bool is_unseen(const plr_search *s, unsigned i) {
 /* True if its bearing is too uncertain to linearise at, though the motion were known: the pose drifted
  * meanwhile. */
 static bool is_lost(const plr_search *s, unsigned i) {
-    const plr_real limit = plr_stereo_max_bearing_variance(s->f), *P = s->residuals[i].P;
+    const plr_real limit = plr_stereo_max_bearing_variance(&s->f->camera), *P = s->residuals[i].P;
     return is_unseen(s, i) && !(P[0] <= limit && P[4] <= limit);
 }
 
@@ -66,7 +66,7 @@ static bool is_dark(const plr_search *s) {
  * in nu when it ends; by an IMU, which lost velocity and tilt as well, it stays in the landmarks' own
  * covariance after that. By twists, where frames did measure the motion, one rejection is an outlier. */
 static bool has_drifted(const plr_search *s, unsigned i) {
-    const bool may_be = is_dark(s) || plr_has_block(s->f, PLR_BLOCK_VELOCITY);
+    const bool may_be = is_dark(s) || plr_has_block(&s->f->belief, PLR_BLOCK_VELOCITY);
     return may_be && s->residuals[i].uncertain && is_unseen(s, i);
 }
 
@@ -90,9 +90,9 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
     }
     const plr_real *U = at->U[s->current];
     plr_real M[6], x[3];
-    const plr_real limit = plr_stereo_max_variance(s->f);
+    const plr_real limit = plr_stereo_max_variance(&s->f->camera);
     /* px^2, as the limit is */
-    const plr_real most = limit * plr_stereo_max_bearing_variance(s->f);
+    const plr_real most = limit * plr_stereo_max_bearing_variance(&s->f->camera);
     bool basis = true, within = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
@@ -111,7 +111,7 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
             for (unsigned l = 0; l < 3; l++)
                 sum += u[k] * u[l] *
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
-        const plr_real noise = plr_stereo_variance(s->f, r);
+        const plr_real noise = plr_stereo_variance(&s->f->camera, r);
         basis = basis && (by == PLR_OF_POINT ? own : sum) - noise <= limit;
         within = within && (dark ? sum : own) - noise <= most;
     }
@@ -185,7 +185,7 @@ static plr_gate_result judge(plr_search *s, unsigned i, bool found, const plr_re
         const plr_real without_it = leave_one_out(at, U, dz, e, &share);
         d2 = share >= LEAST_SHARE ? without_it : d2;
     }
-    *judged_d2 = d2 += plr_stereo_row_gap_d2(s->f, plr_search_row(s, i)->seen);
+    *judged_d2 = d2 += plr_stereo_row_gap_d2(&s->f->camera, plr_search_row(s, i)->seen);
     const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
@@ -316,7 +316,7 @@ static PLR_SELDOM bool search_without_twists(plr_search *s, plr_search_point *be
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
         s->residuals[i].twist_d2 = plr_dot3(s->residuals[i].e, s->residuals[i].e);
-    plr_motion_open_prior(s->f, &s->prior);
+    plr_motion_open_prior(&s->f->belief, &s->f->motion, &s->f->work.noise, &s->prior);
     plr_search_from_zero(s, &open);
     for (unsigned i = 0; i < 2; i++)
         plr_search_descend(s, &open);
@@ -417,7 +417,7 @@ static unsigned enter(plr_search *s) {
         const plr_sighting *row = &s->sightings->at[k];
         if (!plr_is_matched(row))
             continue;
-        const bool known = plr_is_of_known(s->f, row);
+        const bool known = plr_is_of_known(&s->f->belief, row);
         unknown += !known;
         plr_search_add(s, k, known ? 0 : 1);
     }
@@ -433,7 +433,7 @@ static void judge_all(plr_search *s, bool found, const plr_real *U, const plr_re
         const plr_residual *at = &s->residuals[i];
         plr_sighting *row = &sightings->at[at->row];
         plr_linearised *own = &sightings->of_slot[row->slot];
-        plr_slot *slot = plr_slot_of(f, row);
+        plr_slot *slot = plr_slot_of(&f->belief, row);
         const plr_gate_result result = judge(s, i, found, U, dz, &own->d2);
         const bool accepted = result == PLR_GATE_ACCEPTED;
         const bool lost = !accepted && has_drifted(s, i);
@@ -452,7 +452,8 @@ void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *
         .f = f, .sightings = sightings, .residuals = (plr_residual *)(void *)f->work.Vt};
     plr_search_point best;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
-    plr_motion_prior(f, plr_supervise_weight(&f->supervisor), &s.prior);
+    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, plr_supervise_weight(&f->supervisor),
+                     &s.prior);
     const unsigned unknown = enter(&s);
     plr_search_from_zero(&s, &best);
     unsigned active = judge_all_by_prior(&s, &best);
@@ -470,6 +471,6 @@ void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *
     found = found && plr_search_factorise(&best, 0, U);
     if (found)
         (void)plr_search_step(&best, U, dz);
-    plr_motion_at(f, &s.prior, best.z, &first->motion);
+    plr_motion_at(&f->motion, &s.prior, best.z, &first->motion);
     judge_all(&s, found, U, dz, sightings);
 }

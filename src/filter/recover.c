@@ -29,7 +29,7 @@ static void unpack(const plr_filter *f, plr_real P[PLR_POSE_SQUARE]) {
 
 void plr_filter_store_for_recovery(plr_filter *f) {
     plr_real P[PLR_POSE_SQUARE];
-    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
+    plr_covariance_get(&f->belief, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     pack(f, P);
 }
 
@@ -38,10 +38,10 @@ void plr_filter_store_for_recovery(plr_filter *f) {
 static void prior_of_drivers(const plr_filter *f, const plr_real P[PLR_POSE_SQUARE], plr_real *S) {
     const unsigned first = f->belief.layout.driver, drivers = f->belief.layout.drivers;
     for (unsigned d = 0; d < drivers; d++) {
-        const unsigned row = first + d, bias = plr_row_of(f, PLR_BLOCK_BIAS);
+        const unsigned row = first + d, bias = plr_row_of(&f->belief, PLR_BLOCK_BIAS);
         plr_real *own = &S[(drivers + 1) * d];
         if (row >= bias)
-            *own = plr_bias_prior_variance(f, row - bias);
+            *own = plr_bias_prior_variance(&f->source, row - bias);
         else if (row >= PLR_POSE_DIM)
             *own = f->source.start_velocity_variance;
         else
@@ -76,18 +76,18 @@ void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], boo
     f->totals.widened++;
     f->frames_off_the_map = 0;
     f->work.noise.open = 0;
-    plr_motion_clear(f);
-    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
+    plr_motion_clear(&f->belief, &f->motion);
+    plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_xi);
     plr_supervise_begun_anew(&f->supervisor, relocated);
     plr_filter_begin_velocity(f);
 }
 
 void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas) {
     double variance[PLR_POSE_DIM];
-    if (!plr_has_block(f, PLR_BLOCK_BIAS))
+    if (!plr_has_block(&f->belief, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        const plr_real prior = plr_bias_prior_variance(f, i),
+        const plr_real prior = plr_bias_prior_variance(&f->source, i),
                        off = f->belief.bias[i] - f->source.bias_prior[i];
         if (!(off * off <= sigmas * sigmas * prior))
             f->belief.bias[i] = f->source.bias_prior[i];
@@ -96,16 +96,28 @@ void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas) {
     plr_filter_begin_bias(f, variance);
 }
 
+plr_status plr_filter_diverge(plr_filter *f) {
+    f->totals.diverged_ns = f->belief.t_ns;
+    f->work.noise.open = 0; /* W is not added to P any more */
+    return PLR_E_DIVERGED;
+}
+
+plr_status plr_filter_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
+    const plr_status status = plr_covariance_close_noise(&f->belief, &f->camera, &f->work, nu);
+    return status == PLR_OK ? PLR_OK : plr_filter_diverge(f);
+}
+
 void plr_filter_recover(plr_filter *f) {
     plr_real P[PLR_POSE_SQUARE];
     if (f->motion.pending)
         plr_filter_propagate_recovery(f);
     unpack(f, P);
     plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P);
-    if (plr_sensitivity_is_finite(f))
-        plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P);
+    if (plr_sensitivity_is_finite(&f->belief))
+        plr_sensitivity_add_to(&f->belief, &f->camera, plr_row_of(&f->belief, PLR_BLOCK_POSE),
+                               PLR_POSE_DIM, P);
     f->totals.recoveries++;
     plr_filter_begin_anew(f, P, false);
-    plr_calibration_doubt(f);
+    plr_calibration_doubt(&f->camera);
     plr_filter_begin_prior_bias(f, 4); /* what is known of them may be what has broken down */
 }

@@ -38,11 +38,11 @@ enum { STEPS = 3 };
 
 void plr_relocate_watch(plr_filter *f, const plr_sightings *sightings, unsigned unplaced) {
     unsigned seen = unplaced, off = unplaced;
-    if (!plr_map_is_asked(f))
+    if (!plr_map_is_asked(&f->config, &f->map))
         return;
     for (unsigned k = 0; k < sightings->count; k++) {
         const plr_sighting *row = &sightings->at[k];
-        if (!plr_is_of_known(f, row))
+        if (!plr_is_of_known(&f->belief, row))
             continue;
         seen++;
         off += !plr_gate_accepted(row);
@@ -64,9 +64,10 @@ static void take_up(plr_filter *f, const plr_sightings *sightings, const plr_see
         const uint32_t id = sightings->at[seen[i].k].seen->id;
         plr_landmark known;
         plr_new_landmark landmark;
-        if (seen[i].agrees && f->belief.count < f->config.slots && plr_map_ask(f, id, &known) &&
-            plr_model_of(f)->adopt(f, &known, &landmark))
-            plr_slots_append(f, id, true, &landmark);
+        if (seen[i].agrees && f->belief.count < f->config.slots &&
+            plr_map_ask(&f->map, id, &known) &&
+            plr_model_of(&f->belief)->adopt(&f->belief, &f->camera, &f->motion, &known, &landmark))
+            plr_slots_append(&f->belief, id, true, &landmark);
     }
 }
 
@@ -80,17 +81,18 @@ static void begin_at(plr_filter *f, const plr_sightings *sightings, const plr_fo
     plr_filter_begin_anew(f, P, true);
     if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
         plr_filter_begin_prior_bias(f, 4);
-    plr_alignment_keep_world(f);
-    take_up(f, sightings, plr_seen_known_of(f), found->count);
+    plr_alignment_keep_world(&f->source);
+    take_up(f, sightings, plr_seen_known_of(f->work.Vt), found->count);
 }
 
 bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings,
                             plr_frame_events *events) {
     plr_found_pose found;
-    if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(f))
+    if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(&f->config, &f->map))
         return false;
     f->frames_off_the_map = 0;
-    events->lost_in_map = !plr_find_pose(f, sightings, false, &found);
+    events->lost_in_map =
+        !plr_find_pose(&f->belief, &f->camera, &f->map, f->work.Vt, sightings, false, &found);
     if (events->lost_in_map)
         return false;
     begin_at(f, sightings, &found);
@@ -107,7 +109,7 @@ static bool is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE],
         way += C[(PLR_POSE_DIM + 1) * i];
         turn += C[(PLR_POSE_DIM + 1) * (3 + i)];
     }
-    return way + turn * r2 > 2 * plr_stereo_max_bearing_variance(f) * r2;
+    return way + turn * r2 > 2 * plr_stereo_max_bearing_variance(&f->camera) * r2;
 }
 
 static bool slot_is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE],
@@ -119,15 +121,15 @@ static bool slot_is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQU
 /* Known landmarks that the caller has inserted stay: they would not come in again. */
 static bool is_in_map(const plr_filter *f, unsigned slot) {
     plr_landmark known;
-    return f->belief.slots[slot].known && plr_map_ask(f, f->belief.slots[slot].id, &known);
+    return f->belief.slots[slot].known && plr_map_ask(&f->map, f->belief.slots[slot].id, &known);
 }
 
 void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
-    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
+    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(&f->config, &f->map))
         return;
     for (unsigned slot = f->belief.count; slot-- > 0;) /* backwards: removing moves the last */
         if (slot_is_uncertain(f, C, slot) && is_in_map(f, slot))
-            plr_slots_remove(f, slot);
+            plr_slots_remove(&f->belief, slot);
 }
 
 /* How many known landmarks in sight are too uncertain: by the pose if they have just come in
@@ -137,15 +139,15 @@ static unsigned count_uncertain(const plr_filter *f, const plr_sightings *sighti
     plr_real P_xi[PLR_POSE_SQUARE], motion[PLR_POSE_SQUARE];
     unsigned uncertain = 0;
     *new_ones = 0;
-    plr_motion_pose_covariance(f, P_xi);
-    plr_motion_covariance_by_state(f, motion);
+    plr_motion_pose_covariance(&f->belief, &f->motion, P_xi);
+    plr_motion_covariance_by_state(&f->belief, &f->motion, motion);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         motion[i] += f->motion.Q[i];
     for (unsigned k = 0; k < sightings->count; k++) {
         const unsigned slot = sightings->at[k].slot;
-        if (!plr_is_of_known(f, &sightings->at[k]))
+        if (!plr_is_of_known(&f->belief, &sightings->at[k]))
             continue;
-        const bool is_new = plr_has_just_come_in(f, slot);
+        const bool is_new = plr_has_just_come_in(&f->belief, slot);
         const bool is = slot_is_uncertain(f, is_new ? P_xi : motion, slot);
         uncertain += is;
         *new_ones += is && is_new && is_in_map(f, slot);
@@ -156,8 +158,8 @@ static unsigned count_uncertain(const plr_filter *f, const plr_sightings *sighti
 /* They come in again: all known landmarks, or those that have just come in. */
 static void drop_known(plr_filter *f, bool new_ones_alone) {
     for (unsigned slot = f->belief.count; slot-- > 0;) /* backwards: removing moves the last */
-        if ((!new_ones_alone || plr_has_just_come_in(f, slot)) && is_in_map(f, slot))
-            plr_slots_remove(f, slot);
+        if ((!new_ones_alone || plr_has_just_come_in(&f->belief, slot)) && is_in_map(f, slot))
+            plr_slots_remove(&f->belief, slot);
 }
 
 /* Moves the pose to where prediction and frame together have it: to the one that was found, less
@@ -166,7 +168,7 @@ static plr_status move_to(plr_filter *f, const plr_found_pose *found, const plr_
     plr_status status = PLR_OK;
     for (unsigned step = 0; step < STEPS && status == PLR_OK; step++) {
         plr_real xi[PLR_POSE_DIM];
-        plr_pose_towards(f, found->R_WB, found->p_WB, xi);
+        plr_pose_towards(&f->belief, found->R_WB, found->p_WB, xi);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             xi[k] -= gap->back[k];
         status = plr_correct_towards(f, xi);
@@ -181,8 +183,8 @@ static void replace_pose(plr_filter *f, const plr_found_pose *found,
     static const plr_real none[PLR_POSE_DIM] = {0};
     memcpy(f->belief.R_WB, found->R_WB, sizeof f->belief.R_WB);
     memcpy(f->belief.p_WB, found->p_WB, sizeof f->belief.p_WB);
-    plr_covariance_forget(f, PLR_BLOCK_POSE, none);
-    plr_covariance_add(f, PLR_BLOCK_POSE, P);
+    plr_covariance_forget(&f->belief, PLR_BLOCK_POSE, none);
+    plr_covariance_add(&f->belief, PLR_BLOCK_POSE, P);
 }
 
 static bool is_far(const plr_pose_gap *gap) {
@@ -217,7 +219,8 @@ static bool is_regular(const plr_real P[PLR_POSE_SQUARE]) {
 /* Where the frame tells more of the pose than was known. */
 static bool is_told_by_frame(plr_filter *f, const plr_sightings *sightings, plr_found_pose *found,
                              plr_pose_gap *gap) {
-    return plr_find_pose(f, sightings, true, found) && plr_find_gap(f, found, gap) &&
+    return plr_find_pose(&f->belief, &f->camera, &f->map, f->work.Vt, sightings, true, found) &&
+           plr_find_gap(&f->belief, &f->camera, &f->motion, found, gap) &&
            !(gap->least < WIDE_ENOUGH);
 }
 
@@ -229,7 +232,7 @@ plr_status plr_relocate_when_uncertain(plr_filter *f, const plr_sightings *sight
     unsigned new_ones;
     plr_status status;
     *what = PLR_PLACED;
-    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
+    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(&f->config, &f->map))
         return PLR_OK;
     const unsigned uncertain = count_uncertain(f, sightings, &new_ones);
     if (uncertain >= PLR_PLACING_LEAST && is_told_by_frame(f, sightings, &found, &gap)) {
@@ -241,11 +244,12 @@ plr_status plr_relocate_when_uncertain(plr_filter *f, const plr_sightings *sight
         return status != PLR_OK ? status
                                 : go_to(f, &found, &gap, gap.largest > PLR_TOO_WIDE, P, events);
     }
-    plr_motion_pose_covariance(f, P);
+    plr_motion_pose_covariance(&f->belief, &f->motion, P);
     if (new_ones == 0 || !is_regular(P))
         return PLR_OK;
-    const bool tells =
-        plr_find_likeliest_pose(f, sightings, &found) && plr_find_gap(f, &found, &gap);
+    const bool tells = plr_find_likeliest_pose(&f->belief, &f->camera, &f->motion, &f->map,
+                                               f->work.Vt, sightings, &found) &&
+                       plr_find_gap(&f->belief, &f->camera, &f->motion, &found, &gap);
     drop_known(f, true);
     events->lost_in_map = !tells;
     *what = tells ? PLR_MOVED : PLR_LEFT_OUT;

@@ -31,8 +31,8 @@ static void prepare(plr_search *s, unsigned i, const plr_real Kt[PLR_MOTION_BY])
     plr_filter *f = s->f;
     plr_residual *at = &s->residuals[i];
     const unsigned slot = plr_search_row(s, i)->slot;
-    plr_covariance_motion_share(f, plr_covariance_row(f, slot), Kt, at->V);
-    plr_covariance_landmark(f, slot, at->P);
+    plr_covariance_motion_share(&f->belief, plr_covariance_row(&f->belief, slot), Kt, at->V);
+    plr_covariance_landmark(&f->belief, slot, at->P);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)
             for (unsigned k = 0; k < PLR_POSE_DIM; k++)
@@ -62,7 +62,7 @@ typedef struct plr_camera_step {
 
 static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_camera_step *step) {
     plr_applied_motion m;
-    plr_motion_at(s->f, &s->prior, z, &m);
+    plr_motion_at(&s->f->motion, &s->prior, z, &m);
     plr_camera_motion(step->E, step->p, &s->f->camera.given, m.E, m.p);
     plr_se3_rotation(step->R, step->E);
     memcpy(step->z, z, sizeof step->z);
@@ -78,15 +78,15 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     plr_real dq[PLR_ROWS * PLR_POSE_DIM], JP[9], full[9], dz[PLR_ROWS * PLR_POSE_DIM] = {0},
                                                                         shift[3] = {0};
     plr_real S[6];
-    if (!plr_stereo_predict_after(s->f, slot, plr_search_row(s, i)->seen, step->E, step->R, step->p,
-                                  &sight))
+    if (!plr_stereo_predict_after(&s->f->camera, slot, plr_search_row(s, i)->seen, step->E, step->R,
+                                  step->p, &sight))
         return false;
     const plr_real *J = sight.J;
     plr_mat3_mul(JP, J, at->P);
     plr_mat3_mul_nt(full, JP, J);
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++)
-            S[k++] = full[3 * c + r] + (r == c ? plr_stereo_variance(s->f, r) : PLR_R(0));
+            S[k++] = full[3 * c + r] + (r == c ? plr_stereo_variance(&s->f->camera, r) : PLR_R(0));
     if (!plr_cholesky3(S))
         return false;
     plr_gemm_nn(3, PLR_POSE_DIM, 3, J, 3, at->V, PLR_POSE_DIM, dz, PLR_POSE_DIM);
@@ -102,7 +102,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     plr_solve3_transposed(1, S, at->e);
     at->range_change = 0;
     at->range_variance = at->P[8];
-    if (plr_stereo_improves_range(s->f, J, at->P)) {
+    if (plr_stereo_improves_range(&s->f->camera, J, at->P)) {
         plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
         at->range_change = plr_dot3(column, at->e);
@@ -147,7 +147,7 @@ void plr_search_add(plr_search *s, unsigned row, plr_real active) {
 
 void plr_search_prepare(plr_search *s) {
     plr_real K[PLR_MOTION_BY], Kt[PLR_MOTION_BY];
-    plr_motion_by_drivers(s->f, s->prior.L, K);
+    plr_motion_by_drivers(&s->f->belief, &s->f->motion, s->prior.L, K);
     plr_motion_transpose(K, Kt);
     for (unsigned i = 0; i < s->count; i++)
         prepare(s, i, Kt);

@@ -58,7 +58,7 @@ static inline const plr_sighting *plr_search_row(const plr_search *s, unsigned i
 }
 
 static inline plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
-    return plr_slot_of(s->f, plr_search_row(s, i));
+    return plr_slot_of(&s->f->belief, plr_search_row(s, i));
 }
 
 /* Appends a matched row of the frame. `active` is 1 if it takes part in the search, else 0. */

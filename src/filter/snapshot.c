@@ -72,12 +72,12 @@ enum {
 #define SIZE(table) plr_codec_size(table##_fields, sizeof table##_fields / sizeof *table##_fields)
 
 static uint32_t elements(const plr_filter *f, unsigned landmarks) {
-    return (uint32_t)plr_covariance_size(f, landmarks);
+    return (uint32_t)plr_covariance_size(&f->belief, landmarks);
 }
 
 /* Of one column of the sensitivity. */
 static uint32_t rows(const plr_filter *f, unsigned landmarks) {
-    return (uint32_t)plr_covariance_row(f, landmarks);
+    return (uint32_t)plr_covariance_row(&f->belief, landmarks);
 }
 
 /* Behind the sensitivity: by how much each error has been corrected; the covariance's factor, a row of each
@@ -98,7 +98,7 @@ static void pass_calibration(plr_codec *c, plr_filter *f, const plr_error_column
 
 /* P, the sensitivity, and what has become of the calibration. */
 static void pass_covariance(plr_codec *c, plr_filter *f) {
-    plr_codec_numbers(c, PLR_FIELD_REAL, (void *)plr_covariance_elements(f),
+    plr_codec_numbers(c, PLR_FIELD_REAL, (void *)plr_covariance_elements(&f->belief),
                       elements(f, f->belief.count));
     for (unsigned k = 0; k < f->camera.errors.count; k++)
         plr_codec_numbers(c, PLR_FIELD_REAL, f->belief.S[k], rows(f, f->belief.count));
@@ -166,7 +166,7 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
     const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
-    if (!plr_covariance_is_positive(f))
+    if (!plr_covariance_is_positive(&f->belief))
         return PLR_E_DIVERGED;
     plr_state_out out = {.sink = sink, .context = context};
     plr_codec c = {.direction = sink ? PLR_CODEC_WRITE : PLR_CODEC_CHECK,
@@ -283,11 +283,11 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     PASS(c, f, time);
     plr_status status = read_pose(c, f);
     if (f)
-        plr_calibration_forget(f);
+        plr_calibration_forget(&f->camera);
     PASS(c, f, filter);
     if (f) {
         f->belief.count = count.landmarks;
-        plr_velocity_forget(f); /* their clock is not the one that goes on */
+        plr_velocity_forget(&f->belief, &f->source); /* their clock is not the one that goes on */
         memset(f->belief.slots, 0, sizeof f->belief.slots);
         plr_supervise_restored(&f->supervisor);
     }
@@ -296,9 +296,10 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     if (status != PLR_OK)
         return status;
     if (!f)
-        return check_covariance(c, plr_covariance_row(like, count.landmarks), &like->camera.errors);
+        return check_covariance(c, plr_covariance_row(&like->belief, count.landmarks),
+                                &like->camera.errors);
     pass_covariance(c, f);
-    return plr_calibration_is_sound(f) ? as_stored(c) : PLR_E_CORRUPT;
+    return plr_calibration_is_sound(&f->camera) ? as_stored(c) : PLR_E_CORRUPT;
 }
 
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,

@@ -64,7 +64,7 @@ static void choose(plr_filter *f, plr_sightings *frame, plr_report *report) {
         if (!plr_is_matched(row))
             continue;
         report->matched++;
-        plr_track_count(plr_slot_of(f, row), (plr_gate_result)row->verdict);
+        plr_track_count(plr_slot_of(&f->belief, row), (plr_gate_result)row->verdict);
         row->used = plr_gate_accepted(row);
         report->gated = (uint16_t)(report->gated + !row->used);
         report->nis += row->used ? (float)frame->of_slot[row->slot].d2 : 0;
@@ -85,9 +85,9 @@ static void gate_each(plr_filter *f, plr_sightings *frame) {
             continue;
         plr_verdict verdict = {.accepted = false};
         plr_measurement m;
-        if (plr_stereo_measure(f, row->slot, row->seen, &m)) {
+        if (plr_stereo_measure(&f->belief, &f->camera, row->slot, row->seen, &m)) {
             verdict = plr_gate_judge(f, &m);
-            plr_measurement_keep(f, row->slot, &m);
+            plr_measurement_keep(&f->belief, &f->work, row->slot, &m);
         }
         row->verdict =
             (uint8_t)(verdict.accepted ? PLR_GATE_ACCEPTED : plr_gate_rejection(verdict.d2));
@@ -103,9 +103,9 @@ static void gate_each(plr_filter *f, plr_sightings *frame) {
 static bool needs_motion_applied(const plr_filter *f, const plr_sightings *frame) {
     for (unsigned k = 0; k < frame->count; k++) {
         const plr_sighting *row = &frame->at[k];
-        if (plr_is_matched(row)
-                ? plr_gate_accepted(row)
-                : plr_births_are_allowed(f) && plr_stereo_makes_landmark(f, row->seen))
+        if (plr_is_matched(row) ? plr_gate_accepted(row)
+                                : plr_births_are_allowed(f) &&
+                                      plr_stereo_makes_landmark(&f->belief, &f->camera, row->seen))
             return true;
     }
     return false;
@@ -119,8 +119,8 @@ static void measure_used(plr_filter *f, const plr_sightings *frame) {
         plr_measurement m;
         if (!row->used)
             continue;
-        (void)plr_stereo_measure(f, row->slot, row->seen, &m);
-        plr_measurement_keep(f, row->slot, &m);
+        (void)plr_stereo_measure(&f->belief, &f->camera, row->slot, row->seen, &m);
+        plr_measurement_keep(&f->belief, &f->work, row->slot, &m);
     }
 }
 
@@ -144,7 +144,7 @@ static plr_correction motion_first(plr_filter *f, plr_sightings *frame,
     plr_correction correction = {.status = PLR_OK};
     plr_applied_motion stated;
     plr_evidence_pose by_odometry;
-    plr_motion_prior(f, 1, &stated);
+    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, 1, &stated);
     plr_evidence_note_pose(f, &by_odometry);
     plr_motion_find(f, frame, &first);
     *decision = ask_after_search(f, frame, first.outright);
@@ -156,7 +156,7 @@ static plr_correction motion_first(plr_filter *f, plr_sightings *frame,
     }
     plr_bias_consider(f, decision->hold_biases, &before);
     if (first.outright)
-        plr_motion_open_velocity(f);
+        plr_motion_open_velocity(&f->belief, &f->motion);
     correction.status = plr_predict_apply(f, &first.motion);
     if (correction.status != PLR_OK)
         return correction;
@@ -210,7 +210,8 @@ static void let_tracks_drift(plr_filter *f) {
     if (f->supervisor.last_frame_ns == PLR_NEVER_NS || !(f->camera.track_drift_variance > 0))
         return;
     const plr_real seconds = plr_seconds(f->belief.t_ns - f->supervisor.last_frame_ns);
-    plr_model_of(f)->drift(f, PLR_SQRT(f->camera.track_drift_variance * seconds));
+    plr_model_of(&f->belief)
+        ->drift(&f->belief, &f->camera, PLR_SQRT(f->camera.track_drift_variance * seconds));
 }
 
 /* Known landmarks come in, at a pose that is found anew if need be. */
@@ -230,7 +231,7 @@ static plr_status take_up_known(plr_filter *f, plr_sightings *frame, plr_frame_e
     if (status != PLR_OK)
         return status;
     if (came_in > 0 && found != PLR_LEFT_OUT)
-        plr_alignment_keep_world(f);
+        plr_alignment_keep_world(&f->source);
     if (found == PLR_PLACED)
         return PLR_OK;
     report->created = report->no_room = 0; /* they come in again */
@@ -292,9 +293,9 @@ static void carry_out(plr_filter *f, plr_sightings *frame, plr_report *report) {
         plr_filter_store_for_recovery(f);
     if (!decision.covers)
         return;
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY))
         keep_position_and_heading(f, decision.cover);
-    plr_covariance_add(f, PLR_BLOCK_POSE, decision.cover);
+    plr_covariance_add(&f->belief, PLR_BLOCK_POSE, decision.cover);
     plr_relocate_let_go(f, decision.cover);
     f->totals.widened++;
 }
@@ -325,8 +326,9 @@ static plr_status estimate(plr_filter *f, plr_sightings *frame, plr_report *repo
     }
     plr_reading still;
     plr_reading_result unused = {0};
-    const bool stands = f->source.reading_valid && plr_standstill_is_seen(f, frame, &still);
-    const bool is_state = plr_process_of(f)->measure != NULL;
+    const bool stands = f->source.reading_valid &&
+                        plr_standstill_is_seen(&f->belief, &f->camera, &f->config, frame, &still);
+    const bool is_state = plr_process_of(&f->source)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
     status = correct(f, frame, &decision, report);
@@ -370,15 +372,16 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
         return PLR_E_LATE;
     if (frame->t_ns - f->belief.t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_process_of(f)->check(f, f->source.reading,
-                                    plr_seconds(frame->t_ns - f->belief.t_ns));
+    return plr_process_of(&f->source)
+        ->check(&f->belief, &f->source, f->source.reading,
+                plr_seconds(frame->t_ns - f->belief.t_ns));
 }
 
 /* A frame of dead reckoning: applies the motion, and the velocities' information about the
  * biases. */
 static void dead_reckon(plr_filter *f) {
     plr_status status;
-    if (f->motion.pending && plr_velocity_informs_bias(f)) {
+    if (f->motion.pending && plr_velocity_informs_bias(&f->source)) {
         status = plr_predict_apply_pending(f);
         if (status == PLR_OK)
             status = plr_correct(f, NULL, NULL, 0).status;
@@ -403,12 +406,12 @@ static void count(plr_filter *f, const plr_report *report) {
 /* How the camera moves, should its clock be off. */
 static void note_twist(plr_filter *f) {
     plr_real twist[PLR_POSE_DIM], change[3] = {0}, P_u[PLR_POSE_SQUARE];
-    if (!plr_calibration_needs_twist(f))
+    if (!plr_calibration_needs_twist(&f->camera))
         return;
-    plr_process_of(f)->now(f, twist, P_u);
-    if (plr_process_of(f)->changes)
-        plr_process_of(f)->changes(f, twist, change);
-    plr_calibration_at_frame(f, twist, change, P_u);
+    plr_process_of(&f->source)->now(&f->belief, &f->motion, &f->source, twist, P_u);
+    if (plr_process_of(&f->source)->changes)
+        plr_process_of(&f->source)->changes(&f->belief, &f->source, twist, change);
+    plr_calibration_at_frame(&f->belief, &f->camera, &f->source, twist, change, P_u);
 }
 
 static plr_status refuse_damaged(plr_filter *f, plr_report *report) {
@@ -445,7 +448,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     f->totals.frames++;
     memset(&f->work.evidence, 0, sizeof f->work.evidence);
     note_twist(f);
-    if (!plr_process_has_started(f)) {
+    if (!plr_process_has_started(&f->source)) {
         wait_for_start(f, frame, r);
     } else if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
         process(f, frame, r);

@@ -31,9 +31,11 @@ typedef struct plr_measurement {
 
 /* Keeps H, r and R of the measurement of a slot's landmark until the correction: rows by the
  * landmark and maybe the pose. In one frame all have the same R. */
-void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m);
+void plr_measurement_keep(const plr_belief *belief, plr_workspace *work, unsigned slot,
+                          const plr_measurement *m);
 
 /* The measurement that was kept. What the gate alone needs is zero. */
-void plr_measurement_recall(const plr_filter *f, unsigned slot, plr_measurement *m);
+void plr_measurement_recall(const plr_belief *belief, const plr_workspace *work, unsigned slot,
+                            plr_measurement *m);
 
 #endif

@@ -13,7 +13,7 @@
  * finite numbers, and a sigma above zero for each number that was measured. */
 typedef struct plr_sensor_kind {
     /* For a sensor of the state: fills the rows at the present estimate. */
-    void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
+    void (*of_state)(const plr_belief *belief, const plr_reading *reading, plr_measurement *m);
 
     /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how
      * many times. They are held in f->source.either.velocities.held[place] and after it. */
@@ -38,7 +38,9 @@ static inline bool plr_reading_has(const plr_reading *reading, unsigned i) {
 
 /* Looks for a standstill in a frame: true, with the reading, if for a second no pixel moved by more than
  * its noise. */
-bool plr_standstill_is_seen(plr_filter *f, const plr_sightings *sightings, plr_reading *reading);
+bool plr_standstill_is_seen(plr_belief *belief, const plr_camera_model *camera,
+                            const plr_config *config, const plr_sightings *sightings,
+                            plr_reading *reading);
 
 #define SENSOR(number, kind, about) extern const plr_sensor_kind kind;
 #include "sensor/sensors.def"

@@ -15,14 +15,14 @@ static inline bool plr_is_matched(const plr_sighting *s) {
 }
 
 /* The landmark of a matched one. */
-static inline plr_slot *plr_slot_of(plr_filter *f, const plr_sighting *s) {
-    PLR_ASSERT(s->slot < f->belief.count && f->belief.slots[s->slot].id == s->seen->id);
-    return &f->belief.slots[s->slot];
+static inline plr_slot *plr_slot_of(plr_belief *belief, const plr_sighting *s) {
+    PLR_ASSERT(s->slot < belief->count && belief->slots[s->slot].id == s->seen->id);
+    return &belief->slots[s->slot];
 }
 
 /* True if one is matched with a landmark of a given map. */
-static inline bool plr_is_of_known(const plr_filter *f, const plr_sighting *s) {
-    return plr_is_matched(s) && f->belief.slots[s->slot].known;
+static inline bool plr_is_of_known(const plr_belief *belief, const plr_sighting *s) {
+    return plr_is_matched(s) && belief->slots[s->slot].known;
 }
 
 #endif

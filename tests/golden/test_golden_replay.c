@@ -98,7 +98,7 @@ static uint32_t crc_of_bias(void) {
 }
 
 static uint32_t crc_of_sensitivity(void) {
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     uint32_t sum = 0;
     for (unsigned k = 0; k < filter.camera.errors.count; k++)
         sum = plr_crc32(sum, (const uint8_t *)filter.belief.S[k], n * sizeof *filter.belief.S[k]);
@@ -110,8 +110,8 @@ static uint32_t crc_of_sensitivity(void) {
 
 static void describe(char line[LINE], const plr_report *r) {
     plr_real P_xi[36];
-    const unsigned n = plr_covariance_dim(&filter);
-    plr_covariance_get(&filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
+    const unsigned n = plr_covariance_dim(&filter.belief);
+    plr_covariance_get(&filter.belief, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
     snprintf(line, LINE,
              "t %.9f p %.17g %.17g %.17g R %08x P_xi %08x bias %08x landmarks %08x P %08x S %08x "
              "used %u gated %u new %u evicted %u active %u status %d",

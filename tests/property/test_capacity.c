@@ -55,7 +55,7 @@ static void check_capacity(unsigned slots, uint8_t model, uint8_t bias) {
     if (slots <= 20)
         TEST_ASSERT_EQUAL_UINT_MESSAGE(slots, rig.filter.belief.count, at);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(rig.filter.belief.count, rig.report.active, at);
-    TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&rig.filter), at);
+    TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&rig.filter.belief), at);
     demand_marks(at);
     TEST_ASSERT_TRUE_MESSAGE(specimen_gives_finite_numbers(&rig.filter), at);
 }

@@ -228,7 +228,7 @@ static void test_no_input_breaks_the_filter(void) {
                 TEST_ASSERT_TRUE_MESSAGE(specimen_same_state(&before, &filter), at);
             memcpy(&before, &filter, sizeof before);
             TEST_ASSERT_TRUE_MESSAGE(specimen_gives_finite_numbers(&before), at);
-            TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&before), at);
+            TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&before.belief), at);
             (status == PLR_OK ? accepted : refused)[next - attacks_of_all_kinds]++;
             scene_move(&world, 5000000);
         }

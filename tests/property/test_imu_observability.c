@@ -285,7 +285,7 @@ static void demand_agreement(void) {
             hypot(hypot((double)f->belief.slots[slot].x[0], (double)f->belief.slots[slot].x[1]),
                   (double)f->belief.slots[slot].x[2]);
         for (unsigned i = 0; i < 3; i++) {
-            const unsigned row = plr_covariance_row(f, slot) + i;
+            const unsigned row = plr_covariance_row(&f->belief, slot) + i;
             TEST_ASSERT_DOUBLE_WITHIN(near * range * 0.01, (double)f->belief.slots[slot].x[i],
                                       (double)other.belief.slots[slot].x[i]);
             TEST_ASSERT_DOUBLE_WITHIN(near * sigma_of(f, row), sigma_of(f, row),

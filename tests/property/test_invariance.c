@@ -48,7 +48,7 @@ static void some_start(plr_pose *start) {
 }
 
 static bool same_covariance(void) {
-    const unsigned n = plr_covariance_dim(&rig.filter);
+    const unsigned n = plr_covariance_dim(&rig.filter.belief);
     return moved.belief.count == rig.filter.belief.count &&
            same_bits(rig.filter.belief.P, moved.belief.P, n * (n + 1) / 2);
 }

@@ -25,7 +25,7 @@ void setUp(void) {
 
 /* Both bearing variances: (s / f)^2 across, half of it along the rows' mean, less off the axis. */
 static void check_bearing_variances(double sigma_rad) {
-    const unsigned row = plr_covariance_row(&filter, 0);
+    const unsigned row = plr_covariance_row(&filter.belief, 0);
     const double full = sigma_rad * sigma_rad;
     for (unsigned i = row; i < row + 2; i++) {
         const double variance = (double)filter.belief.P[plr_packed_at(i, i)];
@@ -47,5 +47,5 @@ static void test_a_point_three_kilometres_away_keeps_its_bearing_through_birth_a
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 2, &ahead));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 100000000, &ahead));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
-    TEST_ASSERT_TRUE(plr_covariance_is_positive(&filter));
+    TEST_ASSERT_TRUE(plr_covariance_is_positive(&filter.belief));
 }

@@ -42,7 +42,8 @@ static void test_a_pose_is_found_by_the_camera_as_it_is_estimated(void) {
     const plr_frame frame = scene_look(&rig.world);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
     /* the rows of that frame, which is still here */
-    TEST_ASSERT_TRUE(plr_find_pose(&rig.filter, &rig.filter.work.sightings, false, &found));
+    TEST_ASSERT_TRUE(plr_find_pose(&rig.filter.belief, &rig.filter.camera, &rig.filter.map,
+                                   rig.filter.work.Vt, &rig.filter.work.sightings, false, &found));
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_DOUBLE_WITHIN(0.05, rig.world.T_WB[4 * i + 3], found.p_WB[i]);
         for (int j = 0; j < 3; j++)

@@ -26,7 +26,7 @@ static void test_a_pose_set_after_divergence_is_kept_by_the_next_frame(void) {
         rig_drive(5);
         rig_twist();
         rig_twist();
-        const unsigned row = plr_covariance_row(&rig.filter, 0);
+        const unsigned row = plr_covariance_row(&rig.filter.belief, 0);
         rig.filter.belief.P[plr_packed_at(row, row)] = -1; /* found when the motion is applied */
         reseal(&rig.filter);
         plr_frame frame = scene_look(&rig.world);

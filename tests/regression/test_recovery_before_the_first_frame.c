@@ -25,7 +25,7 @@ static void tilt_variance(double of[2]) {
 
 static void demand_that_tilt_stays_as_uncertain(void) {
     double before[2], after[2];
-    const unsigned row = plr_row_of(f, PLR_BLOCK_VELOCITY);
+    const unsigned row = plr_row_of(&f->belief, PLR_BLOCK_VELOCITY);
     tilt_variance(before);
     TEST_ASSERT_TRUE(before[0] > 1e-7 && before[1] > 1e-7);
     f->belief.P[plr_packed_at(row, row)] = PLR_R(-1);

@@ -18,7 +18,7 @@ void setUp(void) {
     rng chance = rng_seeded(71);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, 4);
     specimen_motion(&filter, &chance, &filter.motion);
-    plr_motion_prior(&filter, 1, &found);
+    plr_motion_prior(&filter.belief, &filter.motion, &filter.work.noise, 1, &found);
 }
 
 /* A motion of which only the turn about the third axis was found. */

@@ -65,7 +65,7 @@ static void put_point(const plr_filter *f, const double q[3], plr_slot *slot) {
 /* Standard deviation of a row of the state: of a filter that knows itself fairly well. */
 static double sigma_of(const plr_filter *f, unsigned row) {
     static const double bearing_rad = 2e-3, inverse_range = 2e-3, place_m = 0.1;
-    const unsigned first = plr_covariance_row(f, 0);
+    const unsigned first = plr_covariance_row(&f->belief, 0);
     if (row < 6)
         return row < 3 ? 0.05 : 0.005;
     if (row < first)
@@ -76,7 +76,7 @@ static double sigma_of(const plr_filter *f, unsigned row) {
 }
 
 static void random_covariance(plr_filter *f, rng *r) {
-    const unsigned n = plr_covariance_dim(f);
+    const unsigned n = plr_covariance_dim(&f->belief);
     double *A = specimen_zeros(n, n);
     random_spd(r, n, 0.1, A);
     for (unsigned i = 0; i < n; i++)
@@ -142,7 +142,7 @@ void specimen_imu(plr_filter *f, rng *r, unsigned landmarks) {
 }
 
 double *specimen_covariance(const plr_filter *f) {
-    const unsigned n = plr_covariance_dim(f);
+    const unsigned n = plr_covariance_dim(&f->belief);
     double *P = specimen_zeros(n, n);
     unpack_symmetric(P, f->belief.P, n);
     return P;
@@ -176,7 +176,7 @@ void specimen_bias_derivative(const plr_motion *motion, double B[36]) {
 plr_measurement specimen_measurement(const plr_filter *f, unsigned slot,
                                      const plr_observation *seen) {
     plr_measurement m;
-    if (!plr_stereo_measure(f, slot, seen, &m))
+    if (!plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m))
         abort();
     return m;
 }
@@ -200,7 +200,8 @@ void specimen_put_rows(double *H, unsigned n, const plr_rows *rows) {
 plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
     plr_measurement m;
     plr_verdict none = {.accepted = false};
-    return plr_stereo_measure(f, slot, seen, &m) ? plr_gate_judge(f, &m) : none;
+    return plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m) ? plr_gate_judge(f, &m)
+                                                                      : none;
 }
 
 plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {

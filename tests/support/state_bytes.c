@@ -53,7 +53,7 @@ bool state_bytes_same(const state_bytes *a, const state_bytes *b) {
 
 bool state_bytes_same_filter(const plr_filter *a, const plr_filter *b) {
     static plr_filter copy;
-    const unsigned n = plr_covariance_dim(a);
+    const unsigned n = plr_covariance_dim(&a->belief);
     const size_t P = plr_packed_row(n);
     if (a->belief.count != b->belief.count)
         return false;

@@ -38,20 +38,21 @@ static void take_specimen(plr_model_kind model, unsigned calibrate) {
     config.camera_place_sigma_m = 0.01;
     config.camera_clock_sigma_s = 0.004;
     plr_calibration_lay_out(&filter.camera.errors, &config);
-    plr_calibration_reset(&filter);
+    filter.belief.layout.errors = filter.camera.errors.count;
+    plr_calibration_reset(&filter.camera);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         filter.camera.estimate.twist[i] = (plr_real)(0.3 * rng_normal(&chance));
     filter.camera.estimate.moves = 1;
     for (unsigned k = 0; k < filter.camera.errors.count; k++)
-        for (unsigned i = 0; i < plr_covariance_dim(&filter); i++)
+        for (unsigned i = 0; i < plr_covariance_dim(&filter.belief); i++)
             filter.belief.S[k][i] = (plr_real)(0.3 * rng_normal(&chance));
     for (unsigned i = 0; i < SEEN; i++) {
         const float u = (float)rng_normal(&chance), v = (float)rng_normal(&chance);
         const float shift[4] = {u, v, (float)(0.9 * (double)u), v};
         plr_measurement m;
         seen[i] = specimen_observation(&filter, i, shift);
-        TEST_ASSERT_TRUE(plr_stereo_measure(&filter, i, &seen[i], &m));
-        plr_measurement_keep(&filter, i, &m);
+        TEST_ASSERT_TRUE(plr_stereo_measure(&filter.belief, &filter.camera, i, &seen[i], &m));
+        plr_measurement_keep(&filter.belief, &filter.work, i, &m);
         filter.work.sightings.at[i] = (plr_sighting){&seen[i], (uint16_t)i, PLR_GATE_ACCEPTED, 1};
     }
     filter.work.sightings.count = SEEN;
@@ -59,7 +60,7 @@ static void take_specimen(plr_model_kind model, unsigned calibrate) {
 
 /* The covariance of (state, errors): [P + S V S^T, S V; V S^T, V], V their variances. */
 static void join(const plr_filter *f, const double *V, double *joint) {
-    const unsigned n = plr_covariance_dim(f), m = f->camera.errors.count, all = n + m;
+    const unsigned n = plr_covariance_dim(&f->belief), m = f->camera.errors.count, all = n + m;
     double *P = specimen_covariance(f), *S = specimen_zeros(all, m);
     for (unsigned k = 0; k < m; k++) {
         for (unsigned i = 0; i < n; i++)
@@ -76,7 +77,8 @@ static void join(const plr_filter *f, const double *V, double *joint) {
 
 /* A gain over state and errors. */
 static void dense(double *joint, double *dx) {
-    const unsigned n = plr_covariance_dim(&filter), m = filter.camera.errors.count, all = n + m;
+    const unsigned n = plr_covariance_dim(&filter.belief), m = filter.camera.errors.count,
+                   all = n + m;
     double *H = specimen_zeros(ROWS, all), *HP = specimen_zeros(ROWS, all),
            *K = specimen_zeros(ROWS, all), *S = specimen_zeros(ROWS, ROWS);
     double r[ROWS];
@@ -85,14 +87,14 @@ static void dense(double *joint, double *dx) {
         const plr_measurement measured = specimen_measurement(&filter, i, &seen[i]);
         specimen_put_rows(H + 3 * (size_t)i * all, all, &measured.H);
         to_doubles(r + 3 * i, measured.r, 3);
-        plr_stereo_by_calibration(&filter, i, H_s);
+        plr_stereo_by_calibration(&filter.belief, &filter.camera, i, H_s);
         for (unsigned k = 0; k < m; k++)
             for (unsigned row = 0; row < 3; row++)
                 H[(3 * i + row) * all + n + k] = (double)H_s[k][row];
     }
     oracle_sandwich(ROWS, all, H, joint, S);
     for (unsigned i = 0; i < ROWS; i++)
-        S[i * ROWS + i] += (double)plr_stereo_variance(&filter, i % 3);
+        S[i * ROWS + i] += (double)plr_stereo_variance(&filter.camera, i % 3);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, ROWS, all, all, 1, H, joint, 0, HP);
     memcpy(K, HP, (size_t)ROWS * all * sizeof *K);
     TEST_ASSERT_TRUE(oracle_solve_spd(ROWS, all, S, K));
@@ -106,7 +108,8 @@ static void dense(double *joint, double *dx) {
 
 static void hold_against_dense(plr_model_kind model, unsigned calibrate) {
     take_specimen(model, calibrate);
-    const unsigned n = plr_covariance_dim(&filter), m = filter.camera.errors.count, all = n + m;
+    const unsigned n = plr_covariance_dim(&filter.belief), m = filter.camera.errors.count,
+                   all = n + m;
     TEST_ASSERT_EQUAL_UINT(m, filter.camera.errors.estimated);
     double V[PLR_CALIBRATIONS * PLR_CALIBRATIONS] = {0}, before[PLR_CALIBRATIONS];
     double *joint = specimen_zeros(all, all), *dx = specimen_zeros(all, 1);

@@ -28,7 +28,7 @@ static plr_observation seen[MANY];
 static plr_correction correct(unsigned count) {
     static plr_measurement m[MANY];
     for (unsigned i = 0; i < count; i++)
-        TEST_ASSERT_TRUE(plr_stereo_measure(&filter, i, &seen[i], &m[i]));
+        TEST_ASSERT_TRUE(plr_stereo_measure(&filter.belief, &filter.camera, i, &seen[i], &m[i]));
     return plr_correct(&filter, NULL, m, count);
 }
 
@@ -48,7 +48,7 @@ static void take_specimen(plr_model_kind model, bool bias) {
 
 /* dx = K r and P - K S K^T of the first `count` observations, by one gain in double. */
 static void dense_correction(unsigned count, double *dx, double *P) {
-    const unsigned n = plr_covariance_dim(&filter), m = 3 * count;
+    const unsigned n = plr_covariance_dim(&filter.belief), m = 3 * count;
     double *H = specimen_zeros(m, n), *r = specimen_zeros(m, 1), *S = specimen_zeros(m, m);
     double *HP = specimen_zeros(m, n), *K = specimen_zeros(m, n),
            *prior = specimen_covariance(&filter);
@@ -59,7 +59,7 @@ static void dense_correction(unsigned count, double *dx, double *P) {
     }
     oracle_sandwich(m, n, H, prior, S);
     for (unsigned i = 0; i < m; i++)
-        S[i * m + i] += (double)plr_stereo_variance(&filter, i % 3);
+        S[i * m + i] += (double)plr_stereo_variance(&filter.camera, i % 3);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, n, n, 1, H, prior, 0, HP);
     memcpy(K, HP, (size_t)m * n * sizeof *K);
     TEST_ASSERT_TRUE(oracle_solve_spd(m, n, S, K)); /* K^T = S^-1 H P */
@@ -76,7 +76,8 @@ static void dense_correction(unsigned count, double *dx, double *P) {
 
 static void check_against_dense(plr_model_kind model, bool bias, unsigned count) {
     take_specimen(model, bias);
-    const unsigned n = plr_covariance_dim(&filter), first = plr_covariance_row(&filter, 0);
+    const unsigned n = plr_covariance_dim(&filter.belief),
+                   first = plr_covariance_row(&filter.belief, 0);
     double *dx = specimen_zeros(n, 1), *P = specimen_zeros(n, n),
            *prior = specimen_covariance(&filter);
     dense_correction(count, dx, P);
@@ -130,8 +131,8 @@ static void test_no_observations_change_nothing(void) {
 /* Correlates two errors of a landmark beyond 1: its variances look healthy, S cannot be factorised.
  * Nothing else is tied to it, so that other blocks cannot notice. */
 static void spoil(unsigned slot) {
-    const unsigned row = plr_covariance_row(&filter, slot);
-    for (unsigned i = 0; i < plr_covariance_dim(&filter); i++)
+    const unsigned row = plr_covariance_row(&filter.belief, slot);
+    for (unsigned i = 0; i < plr_covariance_dim(&filter.belief); i++)
         for (unsigned k = row; k < row + 3; k++)
             if (i != k)
                 filter.belief.P[plr_packed_at(i, k)] = 0;
@@ -178,7 +179,7 @@ static void test_blocks_beside_a_failed_one_are_applied(void) {
 /* An indefinite P whose diagonal looks healthy: the subtraction takes more than there is. */
 static void test_a_variance_that_would_be_lost_stops_the_correction(void) {
     take_specimen(PLR_MODEL_BODY, false);
-    const unsigned row = plr_covariance_row(&filter, 0);
+    const unsigned row = plr_covariance_row(&filter.belief, 0);
     const plr_real own = filter.belief.P[plr_packed_at(row, row)];
     /* correlated with the pose beyond 1 */
     filter.belief.P[plr_packed_at(0, 0)] = PLR_R(1e-4);
@@ -194,7 +195,7 @@ static void test_a_variance_that_would_be_lost_stops_the_correction(void) {
 /* A correction of kilometres or of more than 3 rad is no correction. */
 static void test_a_senseless_correction_is_a_divergence(void) {
     take_specimen(PLR_MODEL_BODY, false);
-    for (unsigned i = 0; i < plr_covariance_dim(&filter); i++) /* the pose: ten kilometres */
+    for (unsigned i = 0; i < plr_covariance_dim(&filter.belief); i++) /* the pose: ten kilometres */
         for (unsigned k = 0; k < 3; k++)
             filter.belief.P[plr_packed_at(i, k)] *= i < 3 ? PLR_R(4e10) : PLR_R(2e5);
     seen[0].uL_px += 30;
@@ -209,7 +210,7 @@ static void take_loose_specimen(void) {
     take_specimen(PLR_MODEL_BODY, false);
     for (unsigned slot = 0; slot < MANY; slot++)
         filter.belief.slots[slot].known = 1;
-    for (unsigned i = 0; i < plr_covariance_dim(&filter); i++)
+    for (unsigned i = 0; i < plr_covariance_dim(&filter.belief); i++)
         memset(filter.belief.P + plr_packed_at(i, 0), 0, i * sizeof *filter.belief.P);
 }
 

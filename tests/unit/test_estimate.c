@@ -177,7 +177,7 @@ static void test_trace_is_of_pose_and_biases_now_and_the_landmarks(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
         for (int i = 0; i < 6; i++)
             sum += P[7 * i];
-        for (unsigned i = 12; i < plr_covariance_dim(&rig.filter); i++)
+        for (unsigned i = 12; i < plr_covariance_dim(&rig.filter.belief); i++)
             sum += (double)rig.filter.belief.P[plr_packed_at(i, i)];
         TEST_ASSERT_DOUBLE_WITHIN(1e-12 * sum, sum, plr_filter_trace(&rig.filter));
     }

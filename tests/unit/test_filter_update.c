@@ -239,7 +239,7 @@ static void test_a_gated_observation_moves_nothing(void) {
     TEST_ASSERT_TRUE(same_bits(rig.before.belief.R_WB, rig.filter.belief.R_WB, 9));
     TEST_ASSERT_EQUAL_MEMORY(rig.before.belief.p_WB, rig.filter.belief.p_WB,
                              sizeof rig.filter.belief.p_WB);
-    const unsigned n = plr_covariance_dim(&rig.before);
+    const unsigned n = plr_covariance_dim(&rig.before.belief);
     TEST_ASSERT_TRUE(same_bits(rig.before.belief.P, rig.filter.belief.P, n * (n + 1) / 2));
 }
 
@@ -393,7 +393,7 @@ static void test_an_update_that_loses_a_variance_recovers_too(void) {
     rig_drive(5);
     (void)plr_filter_trace(&rig.filter);
     const plr_frame frame = look();
-    const unsigned row = plr_covariance_row(&rig.filter, 0);
+    const unsigned row = plr_covariance_row(&rig.filter.belief, 0);
     for (unsigned i = 0; i < 3; i++)
         rig.filter.belief.P[plr_packed_at(row + i, 0)] = PLR_R(10); /* correlated beyond 1 */
     reseal(&rig.filter);

@@ -37,14 +37,14 @@ static void test_innovation_is_seen_minus_predicted(void) {
 
 static void test_the_vertical_row_is_a_mean_of_two(void) {
     filter.camera.pixel_variance = PLR_R(9);
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter, 0));
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter, 1));
-    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_stereo_variance(&filter, 2));
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter.camera, 0));
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter.camera, 1));
+    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_stereo_variance(&filter.camera, 2));
 }
 
 /* S = H P H^T + R of a slot, 3x3, and r, in double. */
 static void dense_innovation(unsigned slot, const plr_observation *seen, double S[9], double r[3]) {
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     const plr_measurement m = specimen_measurement(&filter, slot, seen);
     double *H = specimen_zeros(3, n), *P = specimen_covariance(&filter);
     specimen_put_rows(H, n, &m.H);
@@ -147,7 +147,7 @@ static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
 static void test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmarks(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
-    const unsigned row = plr_covariance_row(&filter, 3);
+    const unsigned row = plr_covariance_row(&filter.belief, 3);
     for (unsigned i = row; i < row + 2; i++)
         filter.belief.P[plr_packed_at(i, i)] = PLR_R(9); /* 3 rad of bearing */
     TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);
@@ -158,7 +158,7 @@ static void test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmark
 static void test_an_innovation_covariance_that_is_not_positive_is_rejected(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
-    const unsigned row = plr_covariance_row(&filter, 3);
+    const unsigned row = plr_covariance_row(&filter.belief, 3);
     for (unsigned i = row; i < row + 3; i++)
         filter.belief.P[plr_packed_at(i, i)] = PLR_R(-1);
     TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);

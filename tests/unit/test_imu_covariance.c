@@ -141,7 +141,7 @@ static void joint_noise(const double B[6 * DRIVER], const double *P, unsigned n,
 
 /* P after the stretch; to be freed. */
 static double *expected_covariance(void) {
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     double *P = specimen_covariance(&filter), *A = specimen_zeros(n, n);
     double *N = specimen_zeros(n, CORE), *own = specimen_zeros(n, n);
     double D[16], B[6 * DRIVER], Q[CORE * CORE];
@@ -151,7 +151,7 @@ static double *expected_covariance(void) {
     for (unsigned i = 0; i < CORE; i++)
         N[(CORE + 1) * i] = 1;
     for (unsigned slot = 0; slot < filter.belief.count; slot++) {
-        const unsigned row = plr_covariance_row(&filter, slot);
+        const unsigned row = plr_covariance_row(&filter.belief, slot);
         double F[9], G[18], GB[3 * DRIVER];
         landmark_rows(slot, D, F, G);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, DRIVER, 6, 1, G, B, 0, GB);
@@ -176,11 +176,12 @@ static double *expected_covariance(void) {
 
 static void check_stretch(unsigned landmarks, bool noiseless) {
     take_specimen(landmarks, noiseless);
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     double *expected = expected_covariance();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_pending(&filter));
     TEST_ASSERT_EQUAL_UINT8(1, filter.work.noise.open);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_covariance_close_noise(&filter, NULL));
+    TEST_ASSERT_EQUAL_INT(
+        PLR_OK, plr_covariance_close_noise(&filter.belief, &filter.camera, &filter.work, NULL));
     double *got = specimen_covariance(&filter);
     TEST_ASSERT_DOUBLE_WITHIN(1e-11 + 300 * eps, 0, specimen_gap(n, expected, got));
     free(got);
@@ -205,7 +206,7 @@ static void test_the_estimate_between_frames_has_the_covariance_that_the_frame_w
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, P_xi));
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(&filter, P_u));
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&filter, (double[6]){0}, P_b));
-        const unsigned n = plr_covariance_dim(&filter);
+        const unsigned n = plr_covariance_dim(&filter.belief);
         double *P = expected_covariance();
         for (unsigned i = 0; i < 6; i++)
             for (unsigned j = 0; j < 6; j++) {
@@ -230,12 +231,12 @@ static void test_the_estimate_between_frames_has_the_covariance_that_the_frame_w
 /* A pose that is set drops the motion; velocity and biases are as after it. */
 static void test_a_pose_that_is_set_keeps_what_is_known_of_velocity_and_biases(void) {
     take_specimen(5, false);
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     double *expected = expected_covariance();
     const plr_pose pose = pose_of(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, filter.belief.t_ns, &pose, NULL));
     double *got = specimen_covariance(&filter);
-    TEST_ASSERT_EQUAL_UINT(CORE, plr_covariance_dim(&filter));
+    TEST_ASSERT_EQUAL_UINT(CORE, plr_covariance_dim(&filter.belief));
     for (unsigned i = VELOCITY; i < CORE; i++)
         for (unsigned j = VELOCITY; j < CORE; j++) {
             const double size = sqrt(expected[(n + 1) * i] * expected[(n + 1) * j]);

@@ -35,7 +35,7 @@ void setUp(void) {
 /* A landmark straight ahead of an inverse range that may be negative. */
 static void put(double inverse_range, double sigma) {
     const unsigned slot = filter.belief.count++;
-    const unsigned row = plr_covariance_row(&filter, slot) + 2;
+    const unsigned row = plr_covariance_row(&filter.belief, slot) + 2;
     memset(&filter.belief.slots[slot], 0, sizeof filter.belief.slots[slot]);
     filter.belief.slots[slot].x[2] = 500;
     filter.belief.slots[slot].beyond = (plr_real)(inverse_range - 1.0 / 500);

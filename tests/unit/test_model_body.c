@@ -50,7 +50,8 @@ static void test_observation_agrees_with_differences(void) {
             to_doubles(got, predicted, 3);
             TEST_ASSERT_DOUBLE_WITHIN(5000 * eps, 0, largest_difference(z, got, 3));
             plr_view view;
-            TEST_ASSERT_TRUE(plr_model_of(&filter)->look(&filter, slot, &view));
+            TEST_ASSERT_TRUE(
+                plr_model_of(&filter.belief)->look(&filter.belief, &filter.camera, slot, &view));
             TEST_ASSERT_DOUBLE_WITHIN(0, q[2], (double)view.q[2]);
             specimen_chart(filter.belief.slots[slot].x, Jw, Ji);
             for (int j = 0; j < 3; j++) {
@@ -78,10 +79,11 @@ static void test_a_point_nearer_than_min_depth_is_not_linearised(void) {
     plr_view view;
     for (unsigned i = 0; i < sizeof depths_m / sizeof *depths_m; i++) {
         filter.belief.slots[0].x[2] = (plr_real)depths_m[i];
-        TEST_ASSERT_FALSE(plr_model_of(&filter)->look(&filter, 0, &view));
+        TEST_ASSERT_FALSE(
+            plr_model_of(&filter.belief)->look(&filter.belief, &filter.camera, 0, &view));
     }
     filter.belief.slots[0].x[2] = PLR_R(0.301);
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->look(&filter, 0, &view));
+    TEST_ASSERT_TRUE(plr_model_of(&filter.belief)->look(&filter.belief, &filter.camera, 0, &view));
 }
 
 /* ---------------------------------------------------------------- new landmarks */
@@ -97,7 +99,8 @@ static void test_a_new_landmark_takes_its_covariance_through_the_chart(void) {
         rng_normals(&chance, 0.1, s, 9);
         to_reals(S, s, 9);
         to_doubles(s, S, 9);
-        plr_model_of(&filter)->initialise(&filter, filter.belief.slots[slot].x, S, &landmark);
+        plr_model_of(&filter.belief)
+            ->initialise(&filter.belief, &filter.camera, filter.belief.slots[slot].x, S, &landmark);
         specimen_chart(filter.belief.slots[slot].x, Jw, Ji);
         square_multiply(3, Jw, s, JS);
         oracle_sandwich(3, 3, JS, identity, expected);
@@ -134,7 +137,9 @@ static void test_a_known_landmark_hangs_on_the_pose_as_differences_say(void) {
         double q[3], got[3], Jw[9], Ji[9];
         take_specimen(false, 0);
         known_landmark(&known);
-        TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+        TEST_ASSERT_TRUE(
+            plr_model_of(&filter.belief)
+                ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
         seen_from((const double[6]){0}, known.p_W_m, q);
         to_doubles(got, landmark.x, 3);
         TEST_ASSERT_DOUBLE_WITHIN(300 * eps, 0, largest_difference(q, got, 3));
@@ -177,15 +182,25 @@ static void test_a_known_landmark_on_the_camera_or_out_of_range_is_refused(void)
     rigid_inverse(T_BC, truth.T_CB);
     rigid_apply(centre, T_BC, (const double[3]){0});
     rigid_apply(known.p_W_m, truth.T_WB, centre);
-    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] += 0.5;
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] += 99990;
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] += 20; /* max-range is 100 km */
-    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] = 1e300;
-    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
 }
 
 /* ---------------------------------------------------------------- in the world */
@@ -196,7 +211,9 @@ static void test_place_in_the_world_agrees_with_differences(void) {
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             plr_world_point point;
             double q[3], s[3], m[3], T_BC[16], Jw[9], Ji[9], R_WC[9], J[9];
-            plr_model_of(&filter)->in_world(&filter, &filter.belief.slots[slot], &point);
+            plr_model_of(&filter.belief)
+                ->in_world(&filter.belief, &filter.camera, &filter.motion,
+                           &filter.belief.slots[slot], &point);
             point_of(slot, q);
             rigid_inverse(T_BC, truth.T_CB);
             rigid_apply(s, T_BC, q);

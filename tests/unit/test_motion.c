@@ -65,7 +65,7 @@ static void random_reading(plr_real reading[6], double same[6]) {
 
 static void test_cleared_motion_is_none(void) {
     memset(&filter.motion, 0xFF, sizeof filter.motion);
-    plr_motion_clear(&filter);
+    plr_motion_clear(&filter.belief, &filter.motion);
     const plr_motion motion = filter.motion;
     double D[16], identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     to_small_motion(D, motion.E, motion.p);
@@ -79,7 +79,7 @@ static void test_cleared_motion_is_none(void) {
 
 static plr_status check(double v, double w, double seconds) {
     const plr_real reading[6] = {(plr_real)v, 0, 0, 0, (plr_real)w, 0};
-    return plr_process_twist.check(&filter, reading, (plr_real)seconds);
+    return plr_process_twist.check(&filter.belief, &filter.source, reading, (plr_real)seconds);
 }
 
 static void test_a_step_holds_up_to_pi_and_a_kilometre(void) {
@@ -231,7 +231,7 @@ static double charged(plr_noise_kind noise, double part_s, int parts) {
     const plr_real standing[6] = {0};
     setUp();
     memset(filter.belief.bias, 0, sizeof filter.belief.bias);
-    filter.config.noise = (uint8_t)noise;
+    filter.source.noise = (uint8_t)noise;
     filter.source.velocity_variance[0] = PLR_R(4);
     for (int k = 0; k < parts; k++)
         held_step(&plr_process_twist, &filter, filter.belief.t_ns + 1000000, standing,
@@ -258,7 +258,7 @@ static void test_a_jump_is_exact_and_free_of_noise(void) {
     const double p[3] = {there[3], there[7], there[11]};
     for (int i = 0; i < 9; i++)
         R[i] = (plr_real)there[4 * (i / 3) + i % 3];
-    plr_motion_jump(&filter, 123, R, p);
+    plr_motion_jump(&filter.belief, &filter.motion, 123, R, p);
     TEST_ASSERT_EQUAL_UINT64(123, filter.belief.t_ns);
     TEST_ASSERT_EQUAL_MEMORY(p, filter.belief.p_WB, sizeof p);
     TEST_ASSERT_TRUE(same_bits(R, filter.belief.R_WB, 9));
@@ -289,7 +289,7 @@ static void test_a_correction_is_an_exponential_on_the_right(void) {
     to_doubles(same, xi, 6);
     rigid_exp(D, same);
     square_multiply(4, start, D, expected);
-    plr_pose_correct(&filter, xi);
+    plr_pose_correct(&filter.belief, xi);
     pose_now(got);
     TEST_ASSERT_DOUBLE_WITHIN(50 * eps, 0, largest_difference(expected, got, 16));
 }
@@ -298,7 +298,7 @@ static void test_a_correction_makes_the_rotation_one_again(void) {
     const plr_real none[6] = {0};
     for (int i = 0; i < 9; i++)
         filter.belief.R_WB[i] *= PLR_R(1.0001);
-    plr_pose_correct(&filter, none);
+    plr_pose_correct(&filter.belief, none);
     TEST_ASSERT_DOUBLE_WITHIN(1e-7 + 10 * eps, 0, distance_from_rotation()); /* 1e-4 squared */
 }
 
@@ -327,7 +327,7 @@ static void drive(void) {
 static void add_share_of_bias(double P[36]) {
     plr_real P_b[36];
     double B[36], same[36], share[36];
-    plr_covariance_get(&before, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+    plr_covariance_get(&before.belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     to_doubles(same, P_b, 36);
     specimen_bias_derivative(&before.motion, B);
     oracle_sandwich(6, 6, B, same, share);
@@ -341,10 +341,10 @@ static void check_pose_covariance(plr_model_kind model, bool bias) {
     specimen_filter(&filter, &chance, model, bias, LANDMARKS);
     drive();
     before = filter;
-    plr_motion_pose_covariance(&filter, on_the_side);
+    plr_motion_pose_covariance(&filter.belief, &filter.motion, on_the_side);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
-    plr_covariance_get(&filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, settled);
+    plr_covariance_get(&filter.belief, PLR_BLOCK_POSE, PLR_BLOCK_POSE, settled);
     to_doubles(a, on_the_side, 36);
     to_doubles(b, settled, 36);
     if (bias && model == PLR_MODEL_BODY)
@@ -371,10 +371,10 @@ static void test_settling_charges_the_walk_of_the_bias(void) {
     plr_real was[36], is[36];
     filter.source.bias_velocity_walk = PLR_R(0.5);
     filter.source.bias_gyro_walk = PLR_R(0.125);
-    plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, was);
+    plr_covariance_get(&filter.belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, was);
     drive();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
-    plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, is);
+    plr_covariance_get(&filter.belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, is);
     const double seconds = 0.01 * STEPS;
     for (int i = 0; i < 6; i++)
         TEST_ASSERT_DOUBLE_WITHIN(20 * eps, (i < 3 ? 0.5 : 0.125) * seconds,

@@ -35,7 +35,7 @@ static plr_measurement rows_of(const plr_reading *reading) {
     memset(&m, 0, sizeof m);
     for (int i = 0; i < PLR_ROWS; i++)
         m.R[i] = 1;
-    plr_sensor_of(reading->sensor)->of_state(&filter, reading, &m);
+    plr_sensor_of(reading->sensor)->of_state(&filter.belief, reading, &m);
     return m;
 }
 
@@ -75,7 +75,7 @@ static void compare_with_differences(const plr_reading *reading) {
     const plr_measurement m = rows_of(reading);
     const plr_term *pose = &m.H.term[0];
     TEST_ASSERT_EQUAL_UINT(1, m.H.terms);
-    TEST_ASSERT_EQUAL_UINT(plr_row_of(&filter, PLR_BLOCK_POSE), pose->row);
+    TEST_ASSERT_EQUAL_UINT(plr_row_of(&filter.belief, PLR_BLOCK_POSE), pose->row);
     TEST_ASSERT_EQUAL_UINT(PLR_POSE_DIM, pose->columns);
     for (int c = 0; c < PLR_POSE_DIM; c++) {
         plr_real ahead[PLR_ROWS], behind[PLR_ROWS];

@@ -22,7 +22,7 @@ void setUp(void) {
 static void blocks(double P[][9]) {
     for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         plr_real P_ll[9];
-        plr_covariance_landmark(&rig.filter, slot, P_ll);
+        plr_covariance_landmark(&rig.filter.belief, slot, P_ll);
         for (unsigned i = 0; i < 9; i++)
             P[slot][i] = (double)P_ll[i];
     }
@@ -96,11 +96,11 @@ static void test_the_disparity_does_not_wander(void) {
     rig_drive(10);
     const plr_observation seen = {0};
     for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
-        if (!plr_stereo_measure(&rig.filter, slot, &seen, &m))
+        if (!plr_stereo_measure(&rig.filter.belief, &rig.filter.camera, slot, &seen, &m))
             continue;
-        plr_covariance_of_rows(&rig.filter, &m.H, before);
-        plr_model_of(&rig.filter)->drift(&rig.filter, PLR_R(10));
-        plr_covariance_of_rows(&rig.filter, &m.H, after);
+        plr_covariance_of_rows(&rig.filter.belief, &m.H, before);
+        plr_model_of(&rig.filter.belief)->drift(&rig.filter.belief, &rig.filter.camera, PLR_R(10));
+        plr_covariance_of_rows(&rig.filter.belief, &m.H, after);
         const double u = (double)(after[0] - before[0]), v = (double)(after[8] - before[8]);
         const double uLR = (double)(after[1] - before[1]), uR = (double)(after[4] - before[4]);
         TEST_ASSERT_DOUBLE_WITHIN(0.5, 100, u);
@@ -117,7 +117,7 @@ static void test_landmarks_of_the_map_do_not_wander(void) {
     for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
         rig.filter.belief.slots[slot].known = 1;
     blocks(before);
-    plr_model_of(&rig.filter)->drift(&rig.filter, PLR_R(0.5));
+    plr_model_of(&rig.filter.belief)->drift(&rig.filter.belief, &rig.filter.camera, PLR_R(0.5));
     demand_growth(before, 0);
 }
 
