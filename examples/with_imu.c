@@ -39,7 +39,8 @@ static uint16_t look(double x_m, plr_observation *seen) {
         const double u = camera.cx_px + camera.fx_px * right_m / depth_m;
         const double v = camera.cy_px + camera.fy_px * down_m / depth_m;
         const double disparity = camera.fx_px * camera.baseline_m / depth_m;
-        seen[count++] = (plr_observation){i, (float)u, (float)v, (float)(u - disparity), (float)v};
+        seen[count++] =
+            (plr_observation){i, (float)u, (float)v, (float)(u - disparity), (float)v, 0};
     }
     return count;
 }

@@ -37,8 +37,8 @@ extern "C" {
 #endif
 
 /* Most observations in one frame: 1 to 4096, default 128. A frame with more is refused, so choose
- * the most that the tracker can send. Each takes 4 bytes of RAM in the filter, and 100 in a
- * session. */
+ * the most that the tracker can send. Each takes 8 bytes of RAM in the filter (where an address has 4), and
+ * 120 in a session. */
 #ifndef PLR_MAX_OBSERVATIONS
 #define PLR_MAX_OBSERVATIONS 128
 #endif

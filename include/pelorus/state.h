@@ -328,7 +328,7 @@ typedef struct plr_sighting {
  * noise (src/sensor/measurement.h). */
 typedef struct plr_linearised {
     plr_real H[PLR_ROWS * PLR_LANDMARK_DIM]; /* derivative by the landmark */
-    plr_real r[PLR_ROWS];
+    plr_real r[PLR_ROWS], R[PLR_ROWS];       /* R: variances of the noise */
     plr_real d2; /* the squared distance from its prediction that the gate has judged, in sigmas */
     plr_real det_S; /* of the prediction's covariance: the larger, the more the observation tells */
 } plr_linearised;
@@ -339,7 +339,6 @@ typedef struct plr_sightings {
     /* Of those with a landmark, by its slot. Where the rows depend on the pose too, in `world`, that
      * derivative stands in plr_noise.Wt: such a model leaves it unused. */
     plr_linearised of_slot[PLR_MAX_LANDMARKS];
-    plr_real R[PLR_ROWS]; /* variances of the noise, which all have in common */
     uint16_t count;
     uint8_t terms; /* 2: the rows depend on the pose too */
 } plr_sightings;

@@ -207,11 +207,16 @@ typedef struct plr_imu {
     double w_B_radps[3]; /* angular rate */
 } plr_imu;
 
-/* One landmark in a rectified stereo pair. */
+/* uR_px and vR_px of a point that the left picture alone shows. */
+#define PLR_NOT_SEEN_PX (-1e9F)
+
+/* One landmark in a rectified stereo pair, or in its left picture alone: that tells its bearing, and begins no
+ * landmark. */
 typedef struct plr_observation {
     uint32_t id; /* equal ids in different frames mean the same point; the tracker may reuse the id
                     of a point that has left the filter */
     float uL_px, vL_px, uR_px, vR_px;
+    float sigma_px; /* of each of these coordinates, 1e-3 to 1e3; 0: the setting pixel-sigma */
 } plr_observation;
 
 /* No limit on the observations of a frame. */

@@ -40,7 +40,7 @@ typedef enum plr_kind {
 
 enum {
     PLR_WIRE_VERSION_MAJOR = 1,
-    PLR_WIRE_VERSION_MINOR = 6,
+    PLR_WIRE_VERSION_MINOR = 7,
     PLR_WIRE_KINDS = 16,     /* kinds are 1 to this */
     PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
     PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */
@@ -54,8 +54,8 @@ enum {
  * precisions, and larger than any variance that the filter accepts. */
 #define PLR_WIRE_UNKNOWN_VARIANCE 1099511627776.0
 
-/* Bytes of a STEREO with n observations: the buffer that a reader needs for it. */
-#define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 20 * (n))
+/* Most bytes of a STEREO with n observations: the buffer that a reader needs for it. */
+#define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 24 * (n))
 
 /* The smallest buffer of a reader: enough for all kinds but STEREO, CONFIG being the longest. */
 #define PLR_WIRE_MIN_BUFFER (PLR_WIRE_OVERHEAD + 11 + 9 * PLR_WIRE_MAX_SETTINGS)

@@ -37,8 +37,8 @@ typedef struct plr_sensed {
 /* Measurements that are applied together, stacked: S = H P H^T + R and E = [H W, -y, the same of the
  * sensitivity's columns] with y = r - H dx, then S = U^T U and U^-T E. V^T is in the workspace. */
 typedef struct plr_batch {
-    unsigned rows;
-    unsigned ld; /* between rows of V^T */
+    unsigned rows, empty; /* of which so many measure nothing */
+    unsigned ld;          /* between rows of V^T */
     plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
                PLR_KERNEL_MARGIN]; /* packed upper triangle */
     plr_real E[WIDE * PLR_BLOCK_ROWS];
@@ -60,7 +60,7 @@ static void add_likelihood(plr_likelihood *e, const plr_batch *batch) {
         e->d2 = PLR_FMA(y, y, e->d2);
         plr_log_product_multiply(&e->det_root, batch->S[plr_upper_row(batch->rows, r)]);
     }
-    e->rows += batch->rows;
+    e->rows += batch->rows - batch->empty;
 }
 
 /* Takes the motion's noise into account, once its Lambda = U^T U has been factorised, with its
@@ -79,19 +79,19 @@ static void add_likelihood_of_motion(plr_likelihood *e, const plr_noise *noise,
     }
 }
 
-/* The slot of the next row that is used. */
-static unsigned next_slot(plr_sensed *sensed) {
+/* The next row that is used. */
+static const plr_sighting *next_row(plr_sensed *sensed) {
     while (!sensed->frame->at[sensed->next].used)
         sensed->next++;
     PLR_ASSERT(sensed->next < sensed->frame->count);
-    return sensed->frame->at[sensed->next++].slot;
+    return &sensed->frame->at[sensed->next++];
 }
 
-/* Measurement number i, of an observation of the landmark in this slot. */
+/* Measurement number i; of an observation its row. */
 static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsigned i,
-                            unsigned slot, plr_measurement *m) {
-    if (i < sensed->seen) {
-        plr_measurement_recall(&f->belief, &f->work, slot, m);
+                            const plr_sighting *row, plr_measurement *m) {
+    if (row) {
+        plr_measurement_recall(&f->belief, &f->work, row->slot, m);
     } else if (i < sensed->count) {
         *m = sensed->given[i - sensed->seen];
     } else {
@@ -113,12 +113,12 @@ static unsigned whole_tiles(const plr_filter *f) {
 
 /* A column of the sensitivity (state/sensitivity.h) is corrected as dx is, with -H_s in the place of
  * the residual: by how much the error of the calibration changes what is predicted. */
-static void stack_sensitivity(const plr_filter *f, bool seen, unsigned slot, const plr_rows *H,
+static void stack_sensitivity(const plr_filter *f, const plr_sighting *row, const plr_rows *H,
                               plr_batch *batch, unsigned first) {
     plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS], column[PLR_ROWS];
     memset(H_s, 0, f->camera.errors.count * sizeof *H_s);
-    if (seen && f->camera.errors.count > 0)
-        plr_stereo_by_calibration(&f->belief, &f->camera, slot, H_s);
+    if (row && f->camera.errors.count > 0)
+        plr_stereo_by_calibration(&f->belief, &f->camera, row->slot, row->seen, H_s);
     for (unsigned k = 0; OF_S + k < whole_tiles(f); k++) {
         const bool has_column = k < f->camera.errors.count;
         if (has_column)
@@ -268,14 +268,15 @@ static plr_status correct_by_batch(plr_filter *f, plr_sensed *sensed, unsigned a
     plr_batch batch; /* not initialised: that would cost as much as a row of S */
     bool factorised;
     batch.rows = PLR_ROWS * size;
+    batch.empty = 0;
     batch.ld = plr_covariance_ld(&f->belief);
     for (unsigned i = 0; i < size; i++) {
         plr_measurement m;
-        const bool seen = at + i < sensed->seen;
-        const unsigned slot = seen ? next_slot(sensed) : 0;
-        get_measurement(f, sensed, at + i, slot, &m);
+        const plr_sighting *row = at + i < sensed->seen ? next_row(sensed) : NULL;
+        get_measurement(f, sensed, at + i, row, &m);
         stack(f, &m, PLR_ROWS * i, &batch);
-        stack_sensitivity(f, seen, slot, &m.H, &batch, PLR_ROWS * i);
+        stack_sensitivity(f, row, &m.H, &batch, PLR_ROWS * i);
+        batch.empty += row && plr_is_left_alone(row->seen);
     }
     if (apply_batch(f, &batch, &factorised)) {
         for (unsigned i = at; i < at + size; i++)

@@ -13,6 +13,7 @@
 #include "math/small.h"
 #include "process/alignment.h"
 #include "process/statistics.h"
+#include "sensor/stereo.h"
 #include "state/calibration.h"
 #include "state/seconds.h"
 
@@ -117,10 +118,10 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
 #define MOVED_ABOVE PLR_R(7)
 
 /* What is due, px^2: pixels have noise, and tracks have wandered since the stretch began. */
-static plr_real still2(const plr_filter *f) {
+static plr_real still2(const plr_filter *f, const plr_observation *seen) {
     const plr_alignment *at = &f->source.either.alignment;
     const plr_real seconds = at->count > 0 ? plr_seconds(f->belief.t_ns - at->begin_ns) : PLR_R(0);
-    return PLR_R(4) * f->camera.pixel_variance +
+    return PLR_R(4) * plr_stereo_pixel_variance(&f->camera, seen) +
            PLR_R(2) * f->camera.track_drift_variance * seconds;
 }
 
@@ -149,7 +150,7 @@ static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_o
                       bool early) {
     const plr_real du = (plr_real)(seen->uL_px - point->u_px);
     const plr_real dv = (plr_real)(seen->vL_px - point->v_px);
-    const bool elsewhere = du * du + dv * dv > MOVED_ABOVE * still2(f);
+    const bool elsewhere = du * du + dv * dv > MOVED_ABOVE * still2(f, seen);
     const bool again = elsewhere && (point->used & PLR_POINT_MOVED);
     if (elsewhere && !(point->used & PLR_POINT_CONFIRMED))
         remember(point, seen, early);

@@ -6,14 +6,25 @@
 #include "known_map/lookup.h"
 #include "math/order.h"
 #include "pelorus/assertions.h"
+#include "sensor/stereo.h"
 #include "state/model.h"
 #include "state/sightings.h"
 
 /* A coordinate beyond this lies in no image, px. */
 #define MAX_PIXEL 1e6F
+/* Of sigma_px, as of the setting pixel-sigma. */
+#define MIN_SIGMA 1e-3F
+#define MAX_SIGMA 1e3F
 
 static bool is_pixel(float x) {
     return x > -MAX_PIXEL && x < MAX_PIXEL; /* false for NaN too */
+}
+
+/* A point of both pictures or of the left one, with a sigma of its own or without. */
+static bool is_valid(const plr_observation *o) {
+    const bool right = plr_is_left_alone(o) || (is_pixel(o->uR_px) && is_pixel(o->vR_px));
+    const bool sigma = o->sigma_px == 0 || (o->sigma_px >= MIN_SIGMA && o->sigma_px <= MAX_SIGMA);
+    return is_pixel(o->uL_px) && is_pixel(o->vL_px) && right && sigma;
 }
 
 static bool id_before(const void *context, uint16_t a, uint16_t b) {
@@ -43,8 +54,7 @@ void plr_match_in_order(const plr_frame *frame, plr_sightings *sightings, plr_re
     const plr_observation *seen = frame->observations;
     unsigned n = 0;
     for (uint16_t i = 0; i < frame->count; i++) {
-        const plr_observation *o = &seen[i];
-        if (is_pixel(o->uL_px) && is_pixel(o->vL_px) && is_pixel(o->uR_px) && is_pixel(o->vR_px))
+        if (is_valid(&seen[i]))
             order[n++] = i;
         else
             report->refused++;

@@ -89,7 +89,8 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
         return;
     }
     const plr_real *U = at->U[s->current];
-    plr_real M[6], x[3];
+    plr_real M[6], x[3], R[PLR_ROWS];
+    plr_stereo_variances(&s->f->camera, plr_search_row(s, i)->seen, R);
     const plr_real limit = plr_stereo_max_variance(&s->f->camera);
     /* px^2, as the limit is */
     const plr_real most = limit * plr_stereo_max_bearing_variance(&s->f->camera);
@@ -111,9 +112,8 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
             for (unsigned l = 0; l < 3; l++)
                 sum += u[k] * u[l] *
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
-        const plr_real noise = plr_stereo_variance(&s->f->camera, r);
-        basis = basis && (by == PLR_OF_POINT ? own : sum) - noise <= limit;
-        within = within && (dark ? sum : own) - noise <= most;
+        basis = basis && (by == PLR_OF_POINT ? own : sum) - R[r] <= limit;
+        within = within && (dark ? sum : own) - R[r] <= most;
     }
     at->uncertain = !within;
     if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {

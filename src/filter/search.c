@@ -73,20 +73,22 @@ static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_cam
  * there. */
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step *step) {
     const plr_slot *slot = plr_search_slot(s, i);
+    const plr_observation *seen = plr_search_row(s, i)->seen;
+    const plr_camera_model *camera = &s->f->camera;
     plr_residual *at = &s->residuals[i];
     plr_stereo_prediction sight;
     plr_real dq[PLR_ROWS * PLR_POSE_DIM], JP[9], full[9], dz[PLR_ROWS * PLR_POSE_DIM] = {0},
                                                                         shift[3] = {0};
-    plr_real S[6];
-    if (!plr_stereo_predict_after(&s->f->camera, slot, plr_search_row(s, i)->seen, step->E, step->R,
-                                  step->p, &sight))
+    plr_real S[6], R[PLR_ROWS];
+    if (!plr_stereo_predict_after(camera, slot, seen, step->E, step->R, step->p, &sight))
         return false;
     const plr_real *J = sight.J;
+    plr_stereo_variances(camera, seen, R);
     plr_mat3_mul(JP, J, at->P);
     plr_mat3_mul_nt(full, JP, J);
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++)
-            S[k++] = full[3 * c + r] + (r == c ? plr_stereo_variance(&s->f->camera, r) : PLR_R(0));
+            S[k++] = full[3 * c + r] + (r == c ? R[r] : PLR_R(0));
     if (!plr_cholesky3(S))
         return false;
     plr_gemm_nn(3, PLR_POSE_DIM, 3, J, 3, at->V, PLR_POSE_DIM, dz, PLR_POSE_DIM);
@@ -102,7 +104,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     plr_solve3_transposed(1, S, at->e);
     at->range_change = 0;
     at->range_variance = at->P[8];
-    if (plr_stereo_improves_range(&s->f->camera, J, at->P)) {
+    if (plr_stereo_improves_range(camera, seen, J, at->P)) {
         plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
         at->range_change = plr_dot3(column, at->e);

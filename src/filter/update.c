@@ -38,24 +38,30 @@
 
 /* ---------------------------------------------------------------- gate and budget */
 
+/* det S / det R but for a common factor: the larger, the more an observation tells. */
+static plr_real tells(const plr_camera_model *camera, const plr_sightings *frame, unsigned k) {
+    const plr_sighting *row = &frame->at[k];
+    return frame->of_slot[row->slot].det_S * plr_stereo_sharpness(camera, row->seen);
+}
+
 /* True if row a tells less than row b; of two that tell the same, the one of the higher id. */
-static bool tells_less(const plr_sightings *frame, unsigned a, unsigned b) {
-    const plr_real det_a = frame->of_slot[frame->at[a].slot].det_S;
-    const plr_real det_b = frame->of_slot[frame->at[b].slot].det_S;
-    return det_a < det_b || (!(det_a > det_b) && a > b);
+static bool tells_less(const plr_camera_model *camera, const plr_sightings *frame, unsigned a,
+                       unsigned b) {
+    const plr_real by_a = tells(camera, frame, a), by_b = tells(camera, frame, b);
+    return by_a < by_b || (!(by_a > by_b) && a > b);
 }
 
 /* Of the rows that are used leaves out the one that tells least. */
-static void leave_out_least(plr_sightings *frame) {
+static void leave_out_least(const plr_camera_model *camera, plr_sightings *frame) {
     unsigned least = frame->count;
     for (unsigned k = 0; k < frame->count; k++)
-        if (frame->at[k].used && (least == frame->count || tells_less(frame, k, least)))
+        if (frame->at[k].used && (least == frame->count || tells_less(camera, frame, k, least)))
             least = k;
     PLR_ASSERT(least < frame->count);
     frame->at[least].used = 0;
 }
 
-/* Chooses the rows that are used: those that pass the gate, at most `budget` of them, of the largest det S.
+/* Chooses the rows that are used: those that pass the gate, at most `budget` of them, that tell most.
  * Counts what the gate has said in the report and in each landmark. */
 static void choose(plr_filter *f, plr_sightings *frame, plr_report *report) {
     unsigned accepted = 0;
@@ -68,10 +74,12 @@ static void choose(plr_filter *f, plr_sightings *frame, plr_report *report) {
         row->used = plr_gate_accepted(row);
         report->gated = (uint16_t)(report->gated + !row->used);
         report->nis += row->used ? (float)frame->of_slot[row->slot].d2 : 0;
+        report->nis_dof =
+            (uint16_t)(report->nis_dof + (row->used ? plr_stereo_numbers(row->seen) : 0));
         accepted += row->used;
     }
     for (; accepted > report->budget; accepted--) {
-        leave_out_least(frame);
+        leave_out_least(&f->camera, frame);
         report->left_out++;
     }
 }
@@ -196,7 +204,6 @@ static plr_status correct(plr_filter *f, plr_sightings *frame, plr_search_decisi
     report->innovation_rows = (uint16_t)correction.innovation.rows;
     report->innovation_d2 = (float)correction.innovation.d2;
     report->innovation_log_det = (float)correction.innovation.log_det;
-    report->nis_dof = (uint16_t)(4 * (report->matched - report->gated));
     f->work.evidence.events.cut = correction.cut;
     if (sees_map && correction.status == PLR_OK)
         plr_evidence_after_map(f, &before);

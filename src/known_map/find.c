@@ -27,6 +27,8 @@ static unsigned collect(const plr_belief *belief, const plr_camera_model *camera
     for (unsigned k = 0; k < sightings->count && count < PLR_PLACING_MOST && count < ROOM; k++) {
         const plr_sighting *s = &sightings->at[k];
         plr_landmark known;
+        if (plr_is_left_alone(s->seen)) /* it does not tell how far it is */
+            continue;
         if (new_ones_alone && !(plr_is_matched(s) && plr_has_just_come_in(belief, s->slot)))
             continue;
         if (!plr_map_ask(map, s->seen->id, &known))
@@ -39,6 +41,7 @@ static unsigned collect(const plr_belief *belief, const plr_camera_model *camera
             seen[count].P[i] = (plr_real)known.P_W_m2[i];
         plr_stereo_rows(seen[count].z, s->seen);
         seen[count].gap_d2 = plr_stereo_row_gap_d2(camera, s->seen);
+        seen[count].pixel_variance = plr_stereo_pixel_variance(camera, s->seen);
         seen[count++].k = (uint16_t)k;
     }
     return count;

@@ -57,7 +57,7 @@ static bool look(const plr_sights *s, const plr_seen_known *known, const plr_pla
     plr_mat3_mul_nt(S, DzRP, DzR);
     for (unsigned i = 0; i < 3; i++) {
         e[i] = known->z[i] - e[i];
-        S[4 * i] += plr_stereo_variance(camera, i);
+        S[4 * i] += i == 2 ? PLR_R(0.5) * known->pixel_variance : known->pixel_variance;
     }
     if (!plr_factorise3(U, S))
         return false;
@@ -201,11 +201,12 @@ static bool place_by_three(const plr_sights *s, const unsigned of[3], plr_placin
 
 /* The points near enough for a sample of three. Returns how many. */
 static unsigned find_near(const plr_sights *s, uint8_t near[PLR_PLACING_MOST]) {
-    const plr_real sigma = PLR_SQRT(2 * plr_stereo_variance(s->camera, 0));
     unsigned count = 0;
-    for (unsigned i = 0; i < s->count; i++)
+    for (unsigned i = 0; i < s->count; i++) {
+        const plr_real sigma = PLR_SQRT(2 * s->seen[i].pixel_variance);
         if (s->seen[i].z[0] - s->seen[i].z[1] > DISPARITY_SIGMAS * sigma)
             near[count++] = (uint8_t)i;
+    }
     return count;
 }
 

@@ -16,12 +16,13 @@ enum {
 
 /* A known point in sight. */
 typedef struct plr_seen_known {
-    plr_real w[3];   /* in the world, from an origin near it, m */
-    plr_real P[9];   /* its covariance, m^2 */
-    plr_real z[3];   /* seen: uL, uR, v, px */
-    plr_real gap_d2; /* of vL and vR, which no pose explains */
-    uint16_t k;      /* row of the frame */
-    bool agrees;     /* with the pose at hand */
+    plr_real w[3];           /* in the world, from an origin near it, m */
+    plr_real P[9];           /* its covariance, m^2 */
+    plr_real z[3];           /* seen: uL, uR, v, px */
+    plr_real gap_d2;         /* of vL and vR, which no pose explains */
+    plr_real pixel_variance; /* px^2 */
+    uint16_t k;              /* row of the frame */
+    bool agrees;             /* with the pose at hand */
 } plr_seen_known;
 
 /* q = R w + t: from the world to the left camera. */

@@ -21,6 +21,12 @@
     static const plr_field name##_rows[] = {
 #define ROW(name, type, member, kind_, unit, about)                                                \
     {.offset = offsetof(type, member), .kind = PLR_FIELD_##kind_, .count = 1},
+#define COLUMNS(name, type)                                                                        \
+    }                                                                                              \
+    ;                                                                                              \
+    static const plr_field name##_columns[] = {
+#define COLUMN(name, type, member, kind_, since, unit, about)                                      \
+    {.offset = offsetof(type, member), .kind = PLR_FIELD_##kind_, .count = 1},
 #define END(name)                                                                                  \
     }                                                                                              \
     ;
@@ -37,11 +43,15 @@ typedef struct plr_record {
 #undef FIELD
 #undef ROWS
 #undef ROW
+#undef COLUMNS
+#undef COLUMN
 #undef END
 #define MESSAGE(name, from, about) [PLR_KIND_##name] = {name##_fields, LENGTH(name##_fields)},
 #define FIELD(name, member, kind, count, least, most, since, unit, about)
 #define ROWS(name, type)
 #define ROW(name, type, member, kind, unit, about)
+#define COLUMNS(name, type)
+#define COLUMN(name, type, member, kind, since, unit, about)
 #define END(name)
 
 static const plr_record records[PLR_WIRE_KINDS + 1] = {
@@ -55,6 +65,21 @@ static void pass_rows(plr_codec *c, unsigned count, void *rows, size_t size,
         plr_codec_fields(c, (unsigned char *)rows + i * size, fields, n);
 }
 
+/* Sigmas come behind the observations, where one has its own. */
+static void pass_sigmas(plr_codec *c, unsigned count, plr_observation *rows) {
+    bool there = plr_codec_reads(c) && c->left > 0;
+    if (c->status != PLR_OK)
+        return;
+    for (unsigned i = 0; i < count; i++) {
+        if (plr_codec_reads(c))
+            rows[i].sigma_px = 0;
+        else
+            there = there || rows[i].sigma_px != 0;
+    }
+    if (there)
+        pass_rows(c, count, rows, sizeof *rows, STEREO_columns, LENGTH(STEREO_columns));
+}
+
 /* What is read goes to the reader's room; what is written is only looked at. */
 static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_room *room) {
     plr_observation *rows = (plr_observation *)m->observations;
@@ -66,6 +91,7 @@ static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_
         plr_codec_fail(c, PLR_E_ARGUMENT);
     }
     pass_rows(c, m->count, rows, sizeof *rows, STEREO_rows, LENGTH(STEREO_rows));
+    pass_sigmas(c, m->count, rows);
 }
 
 void plr_message_pass(plr_codec *c, plr_kind kind, void *content,

@@ -19,7 +19,7 @@ void plr_measurement_keep(const plr_belief *belief, plr_workspace *work, unsigne
     PLR_ASSERT(slot < belief->count);
     memcpy(kept->H, own->H, sizeof kept->H);
     memcpy(kept->r, m->r, sizeof kept->r);
-    memcpy(frame->R, m->R, sizeof frame->R);
+    memcpy(kept->R, m->R, sizeof kept->R);
     frame->terms = (uint8_t)m->H.terms;
     if (m->H.terms == 1)
         return;
@@ -37,7 +37,7 @@ void plr_measurement_recall(const plr_belief *belief, const plr_workspace *work,
     plr_real *own = plr_rows_add(&m->H, plr_covariance_row(belief, slot), PLR_LANDMARK_DIM);
     memcpy(own, kept->H, sizeof kept->H);
     memcpy(m->r, kept->r, sizeof m->r);
-    memcpy(m->R, frame->R, sizeof m->R);
+    memcpy(m->R, kept->R, sizeof m->R);
     m->extra_d2 = m->residual2 = m->max_variance = 0;
     if (frame->terms == 1)
         return;

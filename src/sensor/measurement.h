@@ -30,7 +30,7 @@ typedef struct plr_measurement {
 } plr_measurement;
 
 /* Keeps H, r and R of the measurement of a slot's landmark until the correction: rows by the
- * landmark and maybe the pose. In one frame all have the same R. */
+ * landmark and maybe the pose.  */
 void plr_measurement_keep(const plr_belief *belief, plr_workspace *work, unsigned slot,
                           const plr_measurement *m);
 

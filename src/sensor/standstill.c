@@ -29,16 +29,19 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
 const plr_sensor_kind plr_standstill = {
     .of_twist = measure, .place = 1, .axes = 3, .most_value = 0};
 
-/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise
- * and in what its track has wandered since. */
+/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise, taken to
+ * have been the same then, and in what its track has wandered since. */
 static plr_real moved2(const plr_belief *belief, const plr_camera_model *camera,
-                       const plr_slot *slot, const plr_real z[PLR_ROWS]) {
+                       const plr_slot *slot, const plr_observation *seen,
+                       const plr_real z[PLR_ROWS]) {
+    plr_real R[PLR_ROWS];
+    plr_stereo_variances(camera, seen, R);
     const plr_real since = plr_seconds(belief->t_ns - slot->anchor_ns);
     const plr_real drift = camera->track_drift_variance * since;
     plr_real sum = 0;
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real step = z[i] - slot->anchor[i];
-        sum += step * step / (PLR_R(2) * plr_stereo_variance(camera, i) + drift);
+        sum += step * step / (PLR_R(2) * R[i] + drift);
     }
     return sum;
 }
@@ -49,7 +52,7 @@ static void anchor(const plr_belief *belief, plr_slot *slot, const plr_real z[PL
     slot->anchored = 1;
 }
 
-/* Compares the pixels of the landmarks with their anchors, and anchors those that have none.
+/* Compares the pixels of the landmarks that both pictures show with their anchors, and anchors those that have none.
  * Returns whether together they have not moved; *old_rows receives the rows with an anchor of a
  * second ago and more, which alone show that a slow body stands. */
 static bool is_still(plr_belief *belief, const plr_camera_model *camera,
@@ -59,14 +62,14 @@ static bool is_still(plr_belief *belief, const plr_camera_model *camera,
     for (unsigned k = 0; k < sightings->count; k++) {
         const plr_sighting *s = &sightings->at[k];
         plr_real z[PLR_ROWS];
-        if (!plr_is_matched(s))
+        if (!plr_is_matched(s) || plr_is_left_alone(s->seen))
             continue;
         plr_slot *slot = plr_slot_of(belief, s);
         plr_stereo_rows(z, s->seen);
         if (!slot->anchored) {
             anchor(belief, slot, z);
         } else if (belief->t_ns - slot->anchor_ns >= STILL_NS) {
-            distance2 += moved2(belief, camera, slot, z);
+            distance2 += moved2(belief, camera, slot, s->seen, z);
             *old_rows += PLR_ROWS;
         }
     }

@@ -9,6 +9,8 @@
 #include "state/covariance.h"
 #include "state/polar.h"
 
+enum { UR = 1 }; /* the row of an observation that is empty if the left picture alone was seen */
+
 /* ---------------------------------------------------------------- the pair of cameras */
 
 void plr_stereo_project(plr_real z[3], const plr_camera *camera, const plr_real q[3]) {
@@ -52,26 +54,47 @@ void plr_stereo_back_project(plr_real q[3], plr_real Dq[9], const plr_camera *ca
 /* ---------------------------------------------------------------- the measurement */
 
 void plr_stereo_rows(plr_real z[3], const plr_observation *seen) {
+    const bool both = !plr_is_left_alone(seen);
     z[0] = (plr_real)seen->uL_px;
-    z[1] = (plr_real)seen->uR_px;
-    z[2] = PLR_R(0.5) * ((plr_real)seen->vL_px + (plr_real)seen->vR_px);
+    z[1] = both ? (plr_real)seen->uR_px : PLR_R(0);
+    z[2] =
+        both ? PLR_R(0.5) * ((plr_real)seen->vL_px + (plr_real)seen->vR_px) : (plr_real)seen->vL_px;
 }
 
-plr_real plr_stereo_variance(const plr_camera_model *camera, unsigned row) {
-    return row == 2 ? PLR_R(0.5) * camera->pixel_variance : camera->pixel_variance;
+plr_real plr_stereo_pixel_variance(const plr_camera_model *camera, const plr_observation *seen) {
+    const plr_real sigma = (plr_real)seen->sigma_px;
+    return sigma > 0 ? sigma * sigma : camera->pixel_variance;
+}
+
+void plr_stereo_variances(const plr_camera_model *camera, const plr_observation *seen,
+                          plr_real R[PLR_ROWS]) {
+    const plr_real variance = plr_stereo_pixel_variance(camera, seen);
+    const bool both = !plr_is_left_alone(seen);
+    R[0] = variance;
+    R[1] = both ? variance : PLR_R(1);
+    R[2] = both ? PLR_R(0.5) * variance : variance;
+}
+
+plr_real plr_stereo_sharpness(const plr_camera_model *camera, const plr_observation *seen) {
+    const plr_real usual = camera->pixel_variance;
+    const plr_real share = usual / plr_stereo_pixel_variance(camera, seen);
+    return plr_is_left_alone(seen) ? PLR_R(0.5) * usual * share * share : share * share * share;
 }
 
 static plr_real row_gap(const plr_observation *seen) {
-    return (plr_real)seen->vL_px - (plr_real)seen->vR_px;
+    return plr_is_left_alone(seen) ? PLR_R(0) : (plr_real)seen->vL_px - (plr_real)seen->vR_px;
 }
 
 plr_real plr_stereo_row_gap_d2(const plr_camera_model *camera, const plr_observation *seen) {
-    return row_gap(seen) * row_gap(seen) / (PLR_R(2) * camera->pixel_variance);
+    return row_gap(seen) * row_gap(seen) / (PLR_R(2) * plr_stereo_pixel_variance(camera, seen));
 }
 
 static plr_real residual_norm2(const plr_observation *seen, const plr_real z[3]) {
-    const plr_real residual[4] = {(plr_real)seen->uL_px - z[0], (plr_real)seen->uR_px - z[1],
-                                  (plr_real)seen->vL_px - z[2], (plr_real)seen->vR_px - z[2]};
+    const plr_real left[2] = {(plr_real)seen->uL_px - z[0], (plr_real)seen->vL_px - z[2]};
+    if (plr_is_left_alone(seen))
+        return PLR_FMA(left[0], left[0], left[1] * left[1]);
+    const plr_real residual[4] = {left[0], (plr_real)seen->uR_px - z[1], left[1],
+                                  (plr_real)seen->vR_px - z[2]};
     return PLR_FMA(residual[3], residual[3], plr_dot3(residual, residual));
 }
 
@@ -118,6 +141,14 @@ static bool look_by_eye(const plr_camera_model *camera, const plr_real q[3], plr
     return true;
 }
 
+/* Nothing is seen in the right picture: uR says nothing. */
+static void empty_row(plr_measurement *m) {
+    for (unsigned t = 0; t < m->H.terms; t++)
+        memset(m->H.term[t].H + UR * m->H.term[t].columns, 0,
+               m->H.term[t].columns * sizeof *m->H.term[t].H);
+    m->r[UR] = 0;
+}
+
 bool plr_stereo_measure(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                         const plr_observation *seen, plr_measurement *m) {
     const plr_camera *eye = &camera->estimate.eye;
@@ -125,8 +156,7 @@ bool plr_stereo_measure(const plr_belief *belief, const plr_camera_model *camera
     plr_eye_view by_eye;
     plr_view view;
     memset(m, 0, sizeof *m);
-    for (unsigned i = 0; i < PLR_ROWS; i++)
-        m->R[i] = plr_stereo_variance(camera, i);
+    plr_stereo_variances(camera, seen, m->R);
     if (!plr_model_of(belief)->look(belief, camera, slot, &view) ||
         !look_by_eye(camera, view.q, &by_eye)) {
         (void)plr_rows_add(&m->H, plr_covariance_row(belief, slot), PLR_LANDMARK_DIM);
@@ -140,6 +170,8 @@ bool plr_stereo_measure(const plr_belief *belief, const plr_camera_model *camera
     plr_stereo_rows(m->r, seen);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m->r[i] -= z[i];
+    if (plr_is_left_alone(seen))
+        empty_row(m);
     m->extra_d2 = plr_stereo_row_gap_d2(camera, seen);
     m->residual2 = residual_norm2(seen, z);
     m->max_variance = belief->slots[slot].known ? 0 : plr_stereo_max_variance(camera);
@@ -173,7 +205,8 @@ static void point_by_calibration(const plr_camera_model *camera, const plr_real 
 }
 
 void plr_stereo_by_calibration(const plr_belief *belief, const plr_camera_model *camera,
-                               unsigned slot, plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]) {
+                               unsigned slot, const plr_observation *seen,
+                               plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]) {
     plr_view view;
     plr_eye_view by_eye;
     plr_real q_s[PLR_CALIBRATIONS][3];
@@ -185,6 +218,8 @@ void plr_stereo_by_calibration(const plr_belief *belief, const plr_camera_model 
         plr_mat3_vec(H_s[k], by_eye.Dz, q_s[k]);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             H_s[k][r] = -H_s[k][r]; /* so that pixels which stay show the point that changes */
+        if (plr_is_left_alone(seen))
+            H_s[k][UR] = 0;
     }
 }
 
@@ -222,16 +257,24 @@ bool plr_stereo_predict_after(const plr_camera_model *camera, const plr_slot *sl
     plr_stereo_rows(sight->r, seen);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         sight->r[i] -= z[i];
+    if (plr_is_left_alone(seen)) {
+        memset(sight->Dz + 3 * UR, 0, 3 * sizeof *sight->Dz);
+        memset(sight->J + 3 * UR, 0, 3 * sizeof *sight->J);
+        sight->r[UR] = 0;
+    }
     return true;
 }
 
-bool plr_stereo_improves_range(const plr_camera_model *camera, const plr_real J[9],
-                               const plr_real P[9]) {
+bool plr_stereo_improves_range(const plr_camera_model *camera, const plr_observation *seen,
+                               const plr_real J[9], const plr_real P[9]) {
     const plr_real by_range = J[2] - J[5];
-    return by_range * by_range * P[8] > PLR_R(0.02) * camera->pixel_variance;
+    return !plr_is_left_alone(seen) &&
+           by_range * by_range * P[8] > PLR_R(0.02) * plr_stereo_pixel_variance(camera, seen);
 }
 
 plr_real plr_stereo_residual2(const plr_observation *seen, const plr_real r[3]) {
+    if (plr_is_left_alone(seen))
+        return plr_dot3(r, r);
     /* vL and vR lie half the gap to both sides of v */
     return plr_dot3(r, r) + r[2] * r[2] + PLR_R(0.5) * row_gap(seen) * row_gap(seen);
 }
@@ -244,8 +287,13 @@ plr_real plr_stereo_inverse_range_variance(const plr_camera_model *camera) {
 /* ---------------------------------------------------------------- new landmarks */
 
 /* The disparity of a point at infinity lies above this but for one in 700. */
-static plr_real least_disparity(const plr_belief *belief, const plr_camera_model *camera) {
-    return belief->model == PLR_MODEL_BODY ? PLR_R(-4.25) * PLR_SQRT(camera->pixel_variance) : 0;
+static plr_real least_disparity(const plr_belief *belief, const plr_camera_model *camera,
+                                const plr_observation *seen) {
+    if (camera->min_disparity > 0)
+        return camera->min_disparity;
+    return belief->model == PLR_MODEL_BODY
+               ? PLR_R(-4.25) * PLR_SQRT(plr_stereo_pixel_variance(camera, seen))
+               : 0;
 }
 
 /* The least disparity at which a landmark is initialised, px. Further away, the bearing information
@@ -261,9 +309,7 @@ bool plr_stereo_makes_landmark(const plr_belief *belief, const plr_camera_model 
     plr_real z[3];
     plr_stereo_rows(z, seen);
     const plr_real disparity = z[0] - z[1];
-    const plr_real least =
-        camera->min_disparity > 0 ? camera->min_disparity : least_disparity(belief, camera);
-    if (!(disparity >= least) ||
+    if (plr_is_left_alone(seen) || !(disparity >= least_disparity(belief, camera, seen)) ||
         (camera->max_row_gap > 0 && plr_abs(row_gap(seen)) > camera->max_row_gap))
         return false;
     const bool any_depth = belief->model == PLR_MODEL_BODY && camera->max_depth <= 0;
@@ -287,22 +333,26 @@ static plr_real limit_disparity(const plr_belief *belief, const plr_camera_model
 }
 
 /* S_q with S_q S_q^T = Dq R Dq^T, the pixels' noise in the camera; or the course's constant. */
-static void initial_factor(const plr_camera_model *camera, const plr_real Dq[9], plr_real S_q[9]) {
+static void initial_factor(const plr_camera_model *camera, const plr_observation *seen,
+                           const plr_real Dq[9], plr_real S_q[9]) {
     const plr_real constant = camera->landmark_variance;
+    plr_real R[PLR_ROWS];
+    plr_stereo_variances(camera, seen, R);
     for (unsigned i = 0; i < 9; i++)
         S_q[i] = constant > 0 ? (i % 4 == 0 ? PLR_SQRT(constant) : PLR_R(0))
-                              : Dq[i] * PLR_SQRT(plr_stereo_variance(camera, i % 3));
+                              : Dq[i] * PLR_SQRT(R[i % 3]);
 }
 
 plr_real plr_stereo_initialise(const plr_belief *belief, const plr_camera_model *camera,
                                const plr_observation *seen, plr_new_landmark *landmark) {
     const plr_camera *eye = &camera->estimate.eye;
     plr_real z[3], q[3], q_eye[3], Dq[9], S_eye[9], S_q[9], q_s[PLR_CALIBRATIONS][3];
+    PLR_ASSERT(!plr_is_left_alone(seen));
     plr_stereo_rows(z, seen);
     const plr_real missing = limit_disparity(belief, camera, z);
     plr_stereo_back_project(q_eye, Dq, eye, z);
     plr_camera_to_body(q, eye, q_eye);
-    initial_factor(camera, Dq, S_eye);
+    initial_factor(camera, seen, Dq, S_eye);
     plr_mat3_mul_tn(S_q, eye->R_CB, S_eye);
     plr_model_of(belief)->initialise(belief, camera, q, S_q, landmark);
     point_by_calibration(camera, q, q_eye, q_s);

@@ -7,7 +7,8 @@
  *   uL = fx x / z + cx,  uR = fx (x - baseline) / z + cx,  vL = vR = fy y / z + cy.
  * vL and vR measure the same quantity, so the filter uses their mean. An observation has three
  * rows, everywhere in this order: (uL, uR, v) with v = (vL + vR) / 2, and variances s^2, s^2, s^2 /
- * 2 for a pixel sigma s. No information is lost by this.
+ * 2 for a pixel sigma s. No information is lost by this. A point that the left picture alone shows has
+ * v = vL with variance s^2, and an empty row for uR.
  */
 #ifndef PLR_SENSOR_STEREO_H
 #define PLR_SENSOR_STEREO_H
@@ -33,10 +34,28 @@ void plr_stereo_back_project(plr_real q[3], plr_real Dq[9], const plr_camera *ca
 /* The rows (uL, uR, v) of an observation, px. */
 void plr_stereo_rows(plr_real z[3], const plr_observation *seen);
 
-/* The variance of a row, px^2. */
-plr_real plr_stereo_variance(const plr_camera_model *camera, unsigned row);
+/* True if the left picture alone shows the point. */
+static inline bool plr_is_left_alone(const plr_observation *seen) {
+    return seen->uR_px <= PLR_NOT_SEEN_PX && seen->vR_px <= PLR_NOT_SEEN_PX;
+}
 
-/* (vL - vR)^2 / (2 s^2), which does not depend on the state; one degree of freedom. */
+/* The variance of a pixel coordinate, px^2: the observation's own, or the setting's. */
+plr_real plr_stereo_pixel_variance(const plr_camera_model *camera, const plr_observation *seen);
+
+/* The variances of the rows, px^2; of an empty row 1. */
+void plr_stereo_variances(const plr_camera_model *camera, const plr_observation *seen,
+                          plr_real R[PLR_ROWS]);
+
+/* How many numbers an observation measures: uL, vL and maybe uR, vR. */
+static inline unsigned plr_stereo_numbers(const plr_observation *seen) {
+    return plr_is_left_alone(seen) ? 2 : 4;
+}
+
+/* det R of an observation of both pictures with the setting's sigma, beside that of this one. Times det S
+ * it compares what observations tell: ln (det S / det R) is twice their information about the state. */
+plr_real plr_stereo_sharpness(const plr_camera_model *camera, const plr_observation *seen);
+
+/* (vL - vR)^2 / (2 s^2), which does not depend on the state; one degree of freedom. 0 of a left picture. */
 plr_real plr_stereo_row_gap_d2(const plr_camera_model *camera, const plr_observation *seen);
 
 /* The largest variance of a predicted pixel, px^2: one focal length, one radian. Beyond it a
@@ -54,9 +73,11 @@ bool plr_stereo_measure(const plr_belief *belief, const plr_camera_model *camera
                         const plr_observation *seen, plr_measurement *m);
 
 /* H_s: how the three rows change with what is not exact in the calibration: focal length or
- * baseline longer by a share, camera turned. Left as it is for a landmark nearer than min-depth. */
+ * baseline longer by a share, camera turned. Left as it is for a landmark nearer than min-depth; zero in
+ * an empty row. */
 void plr_stereo_by_calibration(const plr_belief *belief, const plr_camera_model *camera,
-                               unsigned slot, plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]);
+                               unsigned slot, const plr_observation *seen,
+                               plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]);
 
 /* --- during the search for the motion: `body` alone --- */
 
@@ -76,10 +97,10 @@ bool plr_stereo_predict_after(const plr_camera_model *camera, const plr_slot *sl
 /* True if a single observation still improves a landmark's range noticeably. After many the range
  * is mostly uncertain by the camera's error, common to all, and correcting each would move them
  * relative to the pose. J is from a prediction, P the landmark's covariance. */
-bool plr_stereo_improves_range(const plr_camera_model *camera, const plr_real J[9],
-                               const plr_real P[9]);
+bool plr_stereo_improves_range(const plr_camera_model *camera, const plr_observation *seen,
+                               const plr_real J[9], const plr_real P[9]);
 
-/* The squared norm of the four residuals (uL, uR, vL, vR), px^2, from that of the three rows. */
+/* The squared norm of the residuals (uL, uR, vL, vR), px^2, from that of the three rows. */
 plr_real plr_stereo_residual2(const plr_observation *seen, const plr_real r[3]);
 
 /* The variance of a far point's inverse range after a single observation, 1/m^2. */
@@ -87,7 +108,8 @@ plr_real plr_stereo_inverse_range_variance(const plr_camera_model *camera);
 
 /* --- new landmarks --- */
 
-/* True if a landmark may be made of it (min-disparity, max-depth, max-row-gap, min-depth). */
+/* True if a landmark may be made of it (min-disparity, max-depth, max-row-gap, min-depth); never of a left
+ * picture alone, which does not tell how far it is. */
 bool plr_stereo_makes_landmark(const plr_belief *belief, const plr_camera_model *camera,
                                const plr_observation *seen);
 

@@ -255,8 +255,8 @@ static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
             continue;
         plr_rig_virtual(v, PLR_LEFT, L, left);
         plr_rig_virtual(v, PLR_RIGHT, R, right);
-        const plr_observation o = {t->id, (float)left[0], (float)left[1], (float)right[0],
-                                   (float)right[1]};
+        const plr_observation o = {t->id,           (float)left[0],  (float)left[1],
+                                   (float)right[0], (float)right[1], 0};
         const plr_sight sight = {t->id, t->age, (float)sigma_of(v, t), (float)t->likeness};
         v->observations[n] = o;
         v->sights[n++] = sight;

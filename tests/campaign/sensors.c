@@ -81,7 +81,7 @@ void sensors_look(sensors *e, const world *w, bool event) {
             mismatch(e, w, z);
         for (int i = 0; i < 4; i++)
             z[i] += w->points[k].drift_px[i % 2] + e->s->pixel_px * chance_normal(&e->pixel_chance);
-        e->seen[e->count++] =
-            (plr_observation){w->points[k].id, (float)z[0], (float)z[1], (float)z[2], (float)z[3]};
+        e->seen[e->count++] = (plr_observation){w->points[k].id, (float)z[0], (float)z[1],
+                                                (float)z[2],     (float)z[3], 0};
     }
 }

@@ -185,7 +185,8 @@ static void look(body *b, const plr_pose *T, plr_observation *seen) {
             place(b, T, k, z);
         for (int i = 0; i < 4; i++)
             z[i] += chance_normal(&b->noise);
-        seen[k] = (plr_observation){b->id[k], (float)z[0], (float)z[1], (float)z[2], (float)z[3]};
+        seen[k] =
+            (plr_observation){b->id[k], (float)z[0], (float)z[1], (float)z[2], (float)z[3], 0};
     }
 }
 

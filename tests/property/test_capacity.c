@@ -76,7 +76,7 @@ static void test_the_build_can_be_filled_to_the_last_slot(void) {
     rig_begin();
     for (unsigned i = 0; i < count; i++) {
         const float u = 100 + (float)(i * 7 % 700), v = 50 + (float)(i * 13 % 500);
-        seen[i] = (plr_observation){i, u, v, u - 5 - (float)(i % 40), v};
+        seen[i] = (plr_observation){i, u, v, u - 5 - (float)(i % 40), v, 0};
     }
     plr_frame frame = {1000000000, PLR_NO_BUDGET, (uint16_t)count, seen};
     for (int k = 0; k < 3; k++) {

@@ -95,7 +95,7 @@ static void drive_blindly(void) {
         scene_move(&rig.world, RIG_STEP_NS);
     }
     demand_same_poses(0, 0, 0);
-    const plr_observation unknown = {99, 400, 300, 390, 300};
+    const plr_observation unknown = {99, 400, 300, 390, 300, 0};
     const plr_frame frame = {plr_filter_time(&filters[0]), 1, 1, &unknown};
     for (int model = 0; model < 2; model++) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filters[model], &frame, NULL));

@@ -18,6 +18,7 @@ from pelorus.calibrated import Calibrated
 from pelorus.errors import PelorusError
 from pelorus.evidence import Evidence, EvidenceFlag
 from pelorus.frames import (
+    NOT_SEEN_PX,
     Camera,
     Config,
     End,
@@ -73,6 +74,7 @@ MESSAGES: list[Message] = [
     Evidence(14, nu=CHANCE.normal(size=6).astype(np.float32), doubt=3, flags=EvidenceFlag(255)),
     Evidence(15, statistic=2.5, adopted=7, rejected=np.array([(9, 4, 8, 40.5)], REJECTED)),
     Text("grün", 2),
+    replace(stereo(3), sigmas=np.array([0.5, 0, 2], np.float32)),
     End(1, 2, 3, 4, 5, 6, 63, (7, 8, 9, 10, 11), 12, 13),
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
     Reading(10, SENSORS["wheel"], 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
@@ -85,7 +87,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.CONFIG: [11 + 9 * 3],
     Kind.START: [417],
     Kind.TWIST: [56],
-    Kind.STEREO: [12 + 20 * n for n in (5, 0, 4096)],
+    Kind.STEREO: [*(12 + 20 * n for n in (5, 0, 4096)), 12 + 24 * 3],
     Kind.TRUTH: [177],
     Kind.LANDMARK: [90],
     Kind.POSE: [36 + 63 * 8 + 32, 36 + 63 * 4 + 32],
@@ -134,6 +136,20 @@ def test_payload_sizes_are_those_of_the_page() -> None:
     for message in MESSAGES:
         found.setdefault(message.kind, []).append(len(message.pack()))
     assert found == SIZES
+
+
+def test_sigmas_stand_behind_the_rows_where_one_is_told() -> None:
+    frame = stereo(3)
+    frame.pixels[:, 2:] = NOT_SEEN_PX  # of the left picture alone
+    plain = frame.pack()
+    told = replace(frame, sigmas=np.array([0.25, 0, 3], np.float32))
+    assert told.sigmas is not None
+    assert told.pack() == plain + told.sigmas.tobytes()
+    assert replace(told, sigmas=np.zeros(3, np.float32)).pack() == plain
+    back, before = Stereo.unpack(told.pack()), Stereo.unpack(plain)
+    assert back.sigmas is not None
+    assert back.sigmas.tolist() == [0.25, 0, 3]
+    assert before.sigmas is None
 
 
 def test_a_frame_is_these_bytes() -> None:
@@ -241,6 +257,8 @@ def test_an_unknown_kind_is_skipped_and_counted_and_takes_part_in_the_sequence()
 def test_a_longer_payload_is_a_later_version_and_a_shorter_one_is_malformed(
     message: Message,
 ) -> None:
+    if isinstance(message, Stereo):  # what is behind the rows are their sigmas
+        message = replace(message, sigmas=np.ones(len(message.ids), np.float32))
     head = bytes([message.kind, 0, 0])
     longer, counts = read(framed(head + message.pack() + b"later"))
     if not isinstance(message, Text):  # a TEXT goes to the end of its payload

@@ -53,7 +53,7 @@ static void test_landmarks_are_as_far_away_as_before(void) {
     const double before = distance_of_first_landmark();
     turn_for_an_hour();
     /* a new point needs the map where the body is: it applies the hour, and tells nothing of it */
-    const plr_observation point = {1, 400, 300, 380, 300};
+    const plr_observation point = {1, 400, 300, 380, 300, 0};
     const plr_frame frame = {plr_filter_time(&rig.filter), PLR_NO_BUDGET, 1, &point};
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
     TEST_ASSERT_EQUAL_UINT16(1, rig.report.created);

@@ -36,10 +36,12 @@ static void stand(void) {
         t_ns += 100000000;
         for (unsigned i = 0; i < POINTS; i++) {
             const double u = 150 + 60 * (i % 5), v = 120 + 60 * (i / 5), sigma = 2;
-            seen[i] = (plr_observation){i + 1, (float)(u + sigma * rng_normal(&chance)),
+            seen[i] = (plr_observation){i + 1,
+                                        (float)(u + sigma * rng_normal(&chance)),
                                         (float)(v + sigma * rng_normal(&chance)),
                                         (float)(u - 0.5 + sigma * rng_normal(&chance)),
-                                        (float)(v + sigma * rng_normal(&chance))};
+                                        (float)(v + sigma * rng_normal(&chance)),
+                                        0};
         }
         const plr_frame frame = {t_ns, PLR_NO_BUDGET, POINTS, seen};
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));

@@ -52,7 +52,7 @@ static void look(unsigned frame, double ahead_mps, unsigned moving, float moved_
         const float u = 60 + 520 * (float)((i * 7) % COUNT) / COUNT;
         const float v = 40 + 400 * (float)((i * 11) % COUNT) / COUNT;
         const float off = (i < moving ? moved_px : 0) + (float)(0.3 * rng_normal(&pixels));
-        const plr_observation o = {i + 1, u + off, v, u + off - 100 / depth, v};
+        const plr_observation o = {i + 1, u + off, v, u + off - 100 / depth, v, 0};
         seen[i] = o;
     }
     const plr_frame of = {t_ns, PLR_NO_BUDGET, (uint16_t)count, seen};

@@ -59,8 +59,8 @@ static void look(plr_time_ns t_ns, double turn, double scattered_rad) {
         const double x = cos(by) * p[0] - sin(by) * p[2], z = sin(by) * p[0] + cos(by) * p[2];
         const double u = 320 + FOCAL_PX * x / z + 0.5 * rng_normal(&pixels);
         const double v = 240 + FOCAL_PX * p[1] / z + 0.5 * rng_normal(&pixels);
-        const plr_observation o = {i + 1, (float)u, (float)v, (float)(u - FOCAL_PX * 0.2 / z),
-                                   (float)v};
+        const plr_observation o = {i + 1,    (float)u, (float)v, (float)(u - FOCAL_PX * 0.2 / z),
+                                   (float)v, 0};
         seen[i] = o;
     }
     const plr_frame frame = {t_ns, PLR_NO_BUDGET, (uint16_t)count, seen};

@@ -39,8 +39,8 @@ static plr_observation look_at_point(double off_px) {
     }
     const double u = c->cx_px + c->fx_px * q[0] / q[2] + off_px;
     const double v = c->cy_px + c->fy_px * q[1] / q[2];
-    const plr_observation o = {OUTLIER_ID, (float)u, (float)v,
-                               (float)(u - c->fx_px * c->baseline_m / q[2]), (float)v};
+    const plr_observation o = {
+        OUTLIER_ID, (float)u, (float)v, (float)(u - c->fx_px * c->baseline_m / q[2]), (float)v, 0};
     return o;
 }
 

@@ -80,7 +80,7 @@ plr_report imu_still_look(double shift_px) {
     plr_report report;
     for (unsigned i = 0; i < 5; i++) {
         const float u = (float)(100 + 90 * i + shift_px);
-        points[i] = (plr_observation){i + 1, u, 200, u - 12, 200};
+        points[i] = (plr_observation){i + 1, u, 200, u - 12, 200, 0};
     }
     const plr_frame frame = {plr_filter_time(f), PLR_NO_BUDGET, 5, points};
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &frame, &report));

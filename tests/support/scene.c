@@ -132,7 +132,8 @@ static bool project(const scene *s, const double q[3], double z[4]) {
 }
 
 static plr_observation measure(scene *s, uint32_t id, const double z[4]) {
-    const double sigma = s->is.pixel_sigma_px;
+    const bool blurred = s->is.blur > 0 && id % 2 == 1;
+    const double sigma = s->is.pixel_sigma_px * (blurred ? s->is.blur : 1);
     double seen[4];
     for (int i = 0; i < 4; i++)
         seen[i] = z[i] + sigma * rng_normal(&s->chance);
@@ -141,7 +142,14 @@ static plr_observation measure(scene *s, uint32_t id, const double z[4]) {
         seen[2] = seen[0] - rng_uniform(&s->chance, 5, 60);
         seen[1] = seen[3] = rng_uniform(&s->chance, 0, HEIGHT_PX);
     }
-    return (plr_observation){id, (float)seen[0], (float)seen[1], (float)seen[2], (float)seen[3]};
+    if (s->is.left_alone > 0 && rng_uniform(&s->chance, 0, 1) < s->is.left_alone)
+        seen[2] = seen[3] = (double)PLR_NOT_SEEN_PX;
+    return (plr_observation){id,
+                             (float)seen[0],
+                             (float)seen[1],
+                             (float)seen[2],
+                             (float)seen[3],
+                             s->is.tells_sigma ? (float)sigma : 0};
 }
 
 plr_frame scene_look(scene *s) {

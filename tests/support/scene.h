@@ -24,8 +24,11 @@ typedef struct scene_options {
     double sway;           /* 1: a driver's unsteadiness on all six axes; 0: none */
     double pixel_sigma_px; /* true noise, of each coordinate */
     double velocity_sigma_mps, gyro_sigma_radps;
-    double bias[6];  /* (b_v, b_w), constant */
-    double outliers; /* fraction of observations that lie anywhere in the image */
+    double bias[6];    /* (b_v, b_w), constant */
+    double outliers;   /* fraction of observations that lie anywhere in the image */
+    double blur;       /* so much larger is the noise of the points of odd ids; 0: it is not */
+    bool tells_sigma;  /* each observation says its own */
+    double left_alone; /* fraction of observations of the left picture alone */
 } scene_options;
 
 typedef struct scene {

@@ -207,9 +207,9 @@ plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observa
 plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {
     plr_real z[3];
     specimen_prediction(f, slot, z);
-    return (plr_observation){f->belief.slots[slot].id, (float)z[0] + shift_px[0],
+    return (plr_observation){f->belief.slots[slot].id,  (float)z[0] + shift_px[0],
                              (float)z[2] + shift_px[1], (float)z[1] + shift_px[2],
-                             (float)z[2] + shift_px[3]};
+                             (float)z[2] + shift_px[3], 0};
 }
 
 void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]) {

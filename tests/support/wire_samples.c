@@ -145,6 +145,7 @@ static void make_stereo(plr_frame *m, unsigned variant) {
         o[i].vL_px = real_of_f32(variant, i + 1);
         o[i].uR_px = real_of_f32(variant, i + 2);
         o[i].vR_px = real_of_f32(variant, i + 5);
+        o[i].sigma_px = real_of_f32(variant, i + 3);
     }
     const uint32_t signalling = 0x7F800001; /* a NaN that a conversion would change */
     if (variant == WIRE_SAMPLE_MOST)

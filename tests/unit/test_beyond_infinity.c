@@ -26,9 +26,12 @@ void setUp(void) {
 static void look(plr_time_ns t_ns, double disparity_px) {
     for (unsigned i = 0; i < POINTS; i++) {
         const double u = 150 + 40 * (i % 8), v = 120 + 40 * (i / 8);
-        seen[i] = (plr_observation){
-            i + 1, (float)(u + rng_normal(&chance)), (float)(v + rng_normal(&chance)),
-            (float)(u - disparity_px + rng_normal(&chance)), (float)(v + rng_normal(&chance))};
+        seen[i] = (plr_observation){i + 1,
+                                    (float)(u + rng_normal(&chance)),
+                                    (float)(v + rng_normal(&chance)),
+                                    (float)(u - disparity_px + rng_normal(&chance)),
+                                    (float)(v + rng_normal(&chance)),
+                                    0};
     }
     const plr_frame frame = {t_ns, PLR_NO_BUDGET, POINTS, seen};
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));

@@ -87,14 +87,14 @@ static void dense(double *joint, double *dx) {
         const plr_measurement measured = specimen_measurement(&filter, i, &seen[i]);
         specimen_put_rows(H + 3 * (size_t)i * all, all, &measured.H);
         to_doubles(r + 3 * i, measured.r, 3);
-        plr_stereo_by_calibration(&filter.belief, &filter.camera, i, H_s);
+        plr_stereo_by_calibration(&filter.belief, &filter.camera, i, &seen[i], H_s);
         for (unsigned k = 0; k < m; k++)
             for (unsigned row = 0; row < 3; row++)
                 H[(3 * i + row) * all + n + k] = (double)H_s[k][row];
     }
     oracle_sandwich(ROWS, all, H, joint, S);
     for (unsigned i = 0; i < ROWS; i++)
-        S[i * ROWS + i] += (double)plr_stereo_variance(&filter.camera, i % 3);
+        S[i * ROWS + i] += (i % 3 == 2 ? 0.5 : 1) * (double)filter.camera.pixel_variance;
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, ROWS, all, all, 1, H, joint, 0, HP);
     memcpy(K, HP, (size_t)ROWS * all * sizeof *K);
     TEST_ASSERT_TRUE(oracle_solve_spd(ROWS, all, S, K));

@@ -59,7 +59,7 @@ static void dense_correction(unsigned count, double *dx, double *P) {
     }
     oracle_sandwich(m, n, H, prior, S);
     for (unsigned i = 0; i < m; i++)
-        S[i * m + i] += (double)plr_stereo_variance(&filter.camera, i % 3);
+        S[i * m + i] += (i % 3 == 2 ? 0.5 : 1) * (double)filter.camera.pixel_variance;
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, n, n, 1, H, prior, 0, HP);
     memcpy(K, HP, (size_t)m * n * sizeof *K);
     TEST_ASSERT_TRUE(oracle_solve_spd(m, n, S, K)); /* K^T = S^-1 H P */

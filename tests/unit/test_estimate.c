@@ -136,7 +136,7 @@ static void test_the_walk_shows_before_it_is_applied(void) {
     for (int i = 0; i < 6; i++)
         TEST_ASSERT_DOUBLE_WITHIN(20 * eps, (i < 3 ? 0.5 : 0.25) * 0.1,
                                   pending[7 * i] - before[7 * i]);
-    const plr_observation unknown = {99, 400, 300, 390, 300}; /* its birth applies it */
+    const plr_observation unknown = {99, 400, 300, 390, 300, 0}; /* its birth applies it */
     const plr_frame frame = {plr_filter_time(&rig.filter), 1, 1, &unknown};
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, NULL));
     TEST_ASSERT_EQUAL_UINT8(0, rig.filter.motion.pending);

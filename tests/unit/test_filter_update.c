@@ -75,7 +75,7 @@ static void test_more_observations_than_the_maximum_are_refused(void) {
     rig_drive(2);
     plr_frame frame = look();
     for (unsigned i = frame.count; i <= PLR_MAX_OBSERVATIONS; i++)
-        seen[i] = (plr_observation){10000 + i, 500, 300, 490, 300};
+        seen[i] = (plr_observation){10000 + i, 500, 300, 490, 300, 0};
     frame.count = PLR_MAX_OBSERVATIONS + 1;
     demand_refused_frame(PLR_E_ARGUMENT, &frame);
     frame.count = UINT16_MAX;

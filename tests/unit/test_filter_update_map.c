@@ -63,7 +63,7 @@ static bool holds(uint32_t id) {
 /* Whether an observation of that disparity and row gap makes a landmark: fx b = 120 px m. */
 static bool makes(double disparity_px, double row_gap_px) {
     seen[0] =
-        (plr_observation){7, 400, 300, (float)(400 - disparity_px), (float)(300 + row_gap_px)};
+        (plr_observation){7, 400, 300, (float)(400 - disparity_px), (float)(300 + row_gap_px), 0};
     const plr_frame frame = {1000000000, PLR_NO_BUDGET, 1, seen};
     rig_begin();
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
@@ -158,7 +158,7 @@ static void test_a_new_landmark_lies_where_its_pixels_say(void) {
 static void see_row(unsigned from, unsigned count, uint32_t first, float u_px, float v_px) {
     for (unsigned i = from; i < from + count; i++) {
         const float u = u_px + (float)(i - from);
-        seen[i] = (plr_observation){first - (i - from), u, v_px, u - 10, v_px};
+        seen[i] = (plr_observation){first - (i - from), u, v_px, u - 10, v_px, 0};
     }
 }
 
@@ -244,7 +244,7 @@ static void test_a_sink_that_fails_keeps_the_landmark_and_is_reported(void) {
 static void test_an_id_that_returns_is_a_new_landmark(void) {
     rig.config.slots = 1;
     rig_begin();
-    seen[0] = (plr_observation){1, 400, 300, 390, 300};
+    seen[0] = (plr_observation){1, 400, 300, 390, 300, 0};
     plr_frame frame = {1000000000, PLR_NO_BUDGET, 1, seen};
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     seen[0].id = 2;

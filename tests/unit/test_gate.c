@@ -37,9 +37,16 @@ static void test_innovation_is_seen_minus_predicted(void) {
 
 static void test_the_vertical_row_is_a_mean_of_two(void) {
     filter.camera.pixel_variance = PLR_R(9);
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter.camera, 0));
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter.camera, 1));
-    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_stereo_variance(&filter.camera, 2));
+    const plr_observation both = {0}, sharp = {.sigma_px = 0.5F},
+                          left = {.uR_px = PLR_NOT_SEEN_PX, .vR_px = PLR_NOT_SEEN_PX};
+    const double expected[3][3] = {{9, 9, 4.5}, {0.25, 0.25, 0.125}, {9, 1, 9}};
+    const plr_observation *const seen_as[3] = {&both, &sharp, &left};
+    for (unsigned i = 0; i < 3; i++) {
+        plr_real R[PLR_ROWS];
+        plr_stereo_variances(&filter.camera, seen_as[i], R);
+        for (unsigned row = 0; row < PLR_ROWS; row++)
+            TEST_ASSERT_EQUAL_DOUBLE(expected[i][row], (double)R[row]);
+    }
 }
 
 /* S = H P H^T + R of a slot, 3x3, and r, in double. */

@@ -222,7 +222,7 @@ static void one_gain(joint_update *u) {
     double *KR = specimen_zeros(n, m);
     oracle_sandwich(m, n, u->H, u->P, S);
     for (unsigned i = 0; i < m; i++)
-        S[i * m + i] += (double)plr_stereo_variance(&filter.camera, i % 3);
+        S[i * m + i] += (i % 3 == 2 ? 0.5 : 1) * (double)filter.camera.pixel_variance;
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, n, n, 1, u->H, u->P, 0, K);
     TEST_ASSERT_TRUE(oracle_solve_spd(m, n, S, K)); /* K^T */
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, 1, n, -1, u->H, u->mean, 1, u->r);
@@ -234,7 +234,8 @@ static void one_gain(joint_update *u) {
     oracle_sandwich(n, n, I_KH, u->P, P);
     for (unsigned i = 0; i < n; i++)
         for (unsigned k = 0; k < m; k++)
-            KR[i * m + k] = K[k * n + i] * sqrt((double)plr_stereo_variance(&filter.camera, k % 3));
+            KR[i * m + k] =
+                K[k * n + i] * sqrt((k % 3 == 2 ? 0.5 : 1) * (double)filter.camera.pixel_variance);
     oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, n, n, m, 1, KR, KR, 1, P);
     memcpy(u->P, P, (size_t)n * n * sizeof *P);
     free(P);

@@ -167,7 +167,7 @@ static void test_allowances_add_up_and_outlast_their_application(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 77, P_moved));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 78, P_moved));
     const plr_frame empty = {.t_ns = 78, .budget = 1}; /* says nothing, and applies nothing */
-    const plr_observation point = {77, 400, 300, 380, 300};
+    const plr_observation point = {77, 400, 300, 380, 300, 0};
     const plr_frame frame = {78, 1, 1, &point}; /* a new point, for which it is applied */
     for (int applied = 0; applied < 2; applied++) {
         TEST_ASSERT_EQUAL_INT(PLR_OK,

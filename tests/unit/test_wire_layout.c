@@ -119,7 +119,7 @@ static void test_twist_fields_lie_where_the_page_says(void) {
 
 static void test_stereo_fields_lie_where_the_page_says(void) {
     const plr_frame m = encode(PLR_KIND_STEREO).as.stereo;
-    TEST_ASSERT_EQUAL_size_t(12 + 20 * 3, length);
+    TEST_ASSERT_EQUAL_size_t(12 + 20 * 3 + 4 * 3, length);
     ASSERT_NUMBER(0, 8, m.t_ns);
     ASSERT_NUMBER(8, 2, m.budget);
     ASSERT_NUMBER(10, 2, 3);
@@ -129,6 +129,7 @@ static void test_stereo_fields_lie_where_the_page_says(void) {
         ASSERT_F32(20 + 20 * i, m.observations[i].vL_px);
         ASSERT_F32(24 + 20 * i, m.observations[i].uR_px);
         ASSERT_F32(28 + 20 * i, m.observations[i].vR_px);
+        ASSERT_F32(12 + 20 * 3 + 4 * i, m.observations[i].sigma_px);
     }
 }
 

@@ -54,7 +54,8 @@ static size_t since_1_2(plr_kind kind) {
 static bool is_whole_in_an_earlier_format(plr_kind kind, size_t n) {
     return (since_1_1(kind) > 0 && n == length - since_1_1(kind)) ||
            (since_1_2(kind) > 0 && n == length - since_1_2(kind)) ||
-           (since_1_3(kind) > 0 && n == length - since_1_3(kind));
+           (since_1_3(kind) > 0 && n == length - since_1_3(kind)) ||
+           (kind == PLR_KIND_STEREO && n == length - 3 * 4); /* the sigmas, since 1.7 */
 }
 
 static void test_every_shorter_payload_is_malformed(void) {
@@ -224,4 +225,45 @@ static void test_bits_and_bytes_without_a_meaning_are_ignored(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(spare[i].kind, length, &m));
         wire_assert_same(&expected, &m);
     }
+}
+
+/* --- sigmas of single observations, since 1.7 --- */
+
+static void stereo_with(const float sigma[3], plr_message *m) {
+    static plr_observation observations[3];
+    for (unsigned i = 0; i < 3; i++)
+        observations[i] =
+            (plr_observation){7 + i, 100, 50, PLR_NOT_SEEN_PX, PLR_NOT_SEEN_PX, sigma[i]};
+    m->kind = PLR_KIND_STEREO;
+    m->as.stereo = (plr_frame){12, PLR_NO_BUDGET, 3, observations};
+    length = wire_payload(m, payload, sizeof payload);
+}
+
+static void test_a_frame_without_a_sigma_has_the_bytes_of_before(void) {
+    const float none[3] = {0, 0, 0};
+    plr_message m;
+    stereo_with(none, &m);
+    TEST_ASSERT_EQUAL_size_t(12 + 3 * 20, length);
+}
+
+static void test_sigmas_come_behind_the_rows_and_are_read_again(void) {
+    const float sigma[3] = {0.25F, 0, 3};
+    plr_message m, got;
+    stereo_with(sigma, &m);
+    TEST_ASSERT_EQUAL_size_t(12 + 3 * 24, length);
+    TEST_ASSERT_EQUAL_MEMORY(sigma, payload + 12 + 3 * 20, sizeof sigma);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(PLR_KIND_STEREO, length, &got));
+    for (unsigned i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL_FLOAT(sigma[i], got.as.stereo.observations[i].sigma_px);
+        TEST_ASSERT_EQUAL_FLOAT(PLR_NOT_SEEN_PX, got.as.stereo.observations[i].vR_px);
+    }
+}
+
+static void test_in_a_payload_of_before_they_are_0(void) {
+    const float sigma[3] = {0.25F, 0, 3};
+    plr_message m, got;
+    stereo_with(sigma, &m);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(PLR_KIND_STEREO, 12 + 3 * 20, &got));
+    for (unsigned i = 0; i < 3; i++)
+        TEST_ASSERT_EQUAL_FLOAT(0, got.as.stereo.observations[i].sigma_px);
 }

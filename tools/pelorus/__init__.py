@@ -9,6 +9,7 @@ __version__ = "0.1.0"
 ARITHMETIC = 23  # PLR_ARITHMETIC of the library that these tools belong to
 
 __all__ = [
+    "NOT_SEEN_PX",
     "Calibration",
     "Filter",
     "FilterError",
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pelorus.errors import PelorusError
     from pelorus.eyes import Tracker
     from pelorus.filter import (
+        NOT_SEEN_PX,
         Calibration,
         Filter,
         FilterError,

@@ -35,6 +35,7 @@ from pelorus.native import Health, Precision, ReadingResult, Report, Supervision
 from pelorus.reason import Reason
 
 __all__ = [
+    "NOT_SEEN_PX",
     "OBSERVATION",
     "Calibration",
     "Filter",
@@ -50,10 +51,9 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-# One landmark in a rectified stereo pair, as the library has it: id and four pixels.
-OBSERVATION = np.dtype(
-    [("id", "<u4"), ("uL_px", "<f4"), ("vL_px", "<f4"), ("uR_px", "<f4"), ("vR_px", "<f4")]
-)
+# One landmark in a rectified stereo pair, as the library has it: id, four pixels and their sigma.
+PIXELS = ("uL_px", "vL_px", "uR_px", "vR_px")
+OBSERVATION = np.dtype([("id", "<u4"), *((name, "<f4") for name in PIXELS), ("sigma_px", "<f4")])
 LANDMARK = np.dtype(
     [("id", "<u4"), ("times_seen", "<u4"), ("times_gated", "<u4"), ("last_seen_ns", "<u8"),
      ("known", "?"), ("p_W_m", "<f8", 3), ("P_W_m2", "<f8", (3, 3))], align=True
@@ -61,6 +61,7 @@ LANDMARK = np.dtype(
 OTHER_MODE = schema.number("status", "MODE")
 NO_HINT: Mapping[int, str] = {}
 NO_BUDGET = schema.LIMITS["no_budget"]
+NOT_SEEN_PX = float(schema.LIMITS["not_seen_px"])  # in the right picture
 MOST_NS = 2**64 - 1
 MOST_ID = 2**32 - 1
 
@@ -113,9 +114,13 @@ class Calibration:
         return cls(**vars(header.camera), R_CB=header.R_CB, t_CB_m=header.t_CB_m)
 
 
-def observations(ids: ArrayLike, pixels: ArrayLike) -> NDArray[np.void]:
+def observations(
+    ids: ArrayLike, pixels: ArrayLike, sigmas: ArrayLike | None = None
+) -> NDArray[np.void]:
     """Observations of a frame: ids (n,), 0 to 2^32 - 1, also as floats that are whole numbers (a
-    column of a table); pixels (n, 4) of (uL, vL, uR, vR)."""
+    column of a table); pixels (n, 4) of (uL, vL, uR, vR), the last two NOT_SEEN_PX where the left
+    picture alone shows the point; sigmas (n,) of these pixels, px, where 0 or None is the setting
+    pixel_sigma."""
     numbers, places = np.asarray(ids), np.asarray(pixels)
     if numbers.ndim != 1 or (numbers.size and not are_whole(numbers)):
         raise PelorusError(f"ids: {kind_of(numbers)}; whole numbers of shape (n,) are wanted")
@@ -124,8 +129,11 @@ def observations(ids: ArrayLike, pixels: ArrayLike) -> NDArray[np.void]:
     frame = np.empty(len(numbers), OBSERVATION)
     frame["id"] = numbers
     pixel = checked("pixels", places, (len(numbers), 4), np.float32)
-    for column, name in enumerate(OBSERVATION.names[1:] if OBSERVATION.names else ()):
+    for column, name in enumerate(PIXELS):
         frame[name] = pixel[:, column]
+    frame["sigma_px"] = (
+        0 if sigmas is None else checked("sigmas", np.asarray(sigmas), (len(numbers),), np.float32)
+    )
     return frame
 
 

@@ -48,7 +48,9 @@ NAME_BYTES_MAX = schema.LIMITS["name_bytes"]
 TEXT_BYTES_MAX = schema.LIMITS["text_bytes"]
 UNKNOWN_VARIANCE = float(schema.LIMITS["unknown_variance"])  # of a filter that has diverged
 OBSERVATION = row_type(schema.MESSAGES["STEREO"].rows)
+SIGMA = row_type(schema.MESSAGES["STEREO"].columns)
 SETTING = row_type(schema.MESSAGES["CONFIG"].rows)
+NOT_SEEN_PX = np.float32(schema.LIMITS["not_seen_px"])  # in the right picture
 
 
 class StartFlag(IntFlag):
@@ -242,12 +244,16 @@ class Imu(Message, kind=Kind.IMU):
 
 @dataclass(frozen=True, eq=False)
 class Stereo(Message, kind=Kind.STEREO):
-    """One stereo frame: `ids` (n,) uint32, `pixels` (n, 4) float32 in the order uL vL uR vR."""
+    """One stereo frame: `ids` (n,) uint32, `pixels` (n, 4) float32 in the order uL vL uR vR, the
+    last two NOT_SEEN_PX where the left picture alone shows the point. `sigmas` (n,) float32, px: 0
+    is the setting pixel-sigma, and None that of all.
+    """
 
     t_ns: int
     ids: NDArray[np.uint32]
     pixels: NDArray[np.float32]
     budget: int = NO_BUDGET
+    sigmas: NDArray[np.float32] | None = None
 
     def values(self) -> dict[str, Any]:
         return super().values() | {"count": len(self.ids)}
@@ -259,13 +265,20 @@ class Stereo(Message, kind=Kind.STEREO):
         rows = np.empty(count, _STEREO_ROW)
         rows["id"] = self.ids
         rows["pixels"] = self.pixels
-        return super().pack() + rows.tobytes()
+        own = np.zeros(count, SIGMA["sigma_px"])
+        if self.sigmas is not None:
+            own[:] = self.sigmas
+        return super().pack() + rows.tobytes() + (own.tobytes() if own.any() else b"")
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
         rows = rows_of(payload, end, _STEREO_ROW, values["count"])
         ids, pixels = rows["id"].astype(np.uint32), rows["pixels"].astype(np.float32)
-        return cls(values["t_ns"], ids, pixels, values["budget"])
+        behind = end + rows.nbytes
+        if len(payload) <= behind:  # none has one of its own, or the writer is of before 1.7
+            return cls(values["t_ns"], ids, pixels, values["budget"])
+        own = rows_of(payload, behind, SIGMA, len(ids))["sigma_px"].astype(np.float32)
+        return cls(values["t_ns"], ids, pixels, values["budget"], own)
 
 
 # The row's numbers behind the id as one array.

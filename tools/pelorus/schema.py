@@ -31,12 +31,15 @@ class Field:
 
 @dataclass(frozen=True)
 class MessageTable:
-    """A kind of frame; `rows` follow as often as the last number before them says."""
+    """A kind of frame; `rows` follow as often as the last number before them says, and behind all
+    of them `columns` of them that a later version added, or none.
+    """
 
     kind: int
     name: str
     fields: tuple[Field, ...]
     rows: tuple[Field, ...]
+    columns: tuple[Field, ...]
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,10 @@ class Setting:
 
 
 def _message(row: dict[str, Any]) -> MessageTable:
-    fields, rows = (tuple(Field(**f) for f in row.get(key, ())) for key in ("fields", "rows"))
-    return MessageTable(row["kind"], row["name"], fields, rows)
+    fields, rows, columns = (
+        tuple(Field(**f) for f in row.get(key, ())) for key in ("fields", "rows", "columns")
+    )
+    return MessageTable(row["kind"], row["name"], fields, rows, columns)
 
 
 def _setting(row: dict[str, Any]) -> Setting:

@@ -76,8 +76,8 @@ static void print_message(const row *first) {
     print_pair("about", first->about);
     printf(",\n     \"fields\": [");
     for (const row *r = first + 1; r->kind != ROW_END; r++) {
-        if (r->kind == ROW_REPEATED) {
-            printf("],\n     \"rows\": [");
+        if (r->kind == ROW_REPEATED || r->kind == ROW_COLUMNS) {
+            printf("],\n     \"%s\": [", r->kind == ROW_COLUMNS ? "columns" : "rows");
             between = "\n       ";
             continue;
         }

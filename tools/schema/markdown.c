@@ -42,7 +42,7 @@ static void step_over(place *at, const row *field) {
         at->bytes += numbers(field) * schema_bytes(field);
 }
 
-/* Bytes of one row of a message that has rows. */
+/* Bytes of one row of a message that has rows, or of the columns behind them. */
 static unsigned row_bytes(const row *repeated) {
     unsigned bytes = 0;
     for (const row *r = repeated + 1; r->kind == ROW_FIELD; r++)
@@ -79,12 +79,20 @@ static void print_field(const place *at, const row *field) {
 
 static void print_message(const row *message) {
     place at = {0, 0, NULL, NULL};
-    char rows[32];
+    unsigned before = 0, each = 0; /* bytes before the rows, and of a row */
+    char rows[48];
     printf("| at | type | field | unit | |\n|---|---|---|---|---|\n");
     for (const row *r = message + 1; r->kind != ROW_END; r++) {
         if (r->kind == ROW_REPEATED) {
-            snprintf(rows, sizeof rows, "%u i", row_bytes(r));
+            before = at.bytes;
+            each = row_bytes(r);
+            snprintf(rows, sizeof rows, "%u i", each);
             at.rows = rows;
+            continue;
+        }
+        if (r->kind == ROW_COLUMNS) {
+            at.bytes = before;
+            snprintf(rows, sizeof rows, "%u n + %u i", each, row_bytes(r));
             continue;
         }
         print_field(&at, r);
@@ -97,7 +105,7 @@ static void print_kinds(void) {
     for (size_t i = 0; i < schema_message_rows; i++) {
         const row *r = &schema_messages[i];
         place at = {0, 0, NULL, NULL};
-        char rows[32];
+        char rows[48];
         if (r->kind != ROW_TABLE)
             continue;
         printf("| %u | %s | ", r->number, r->name);
@@ -105,7 +113,13 @@ static void print_kinds(void) {
         for (r++; r->kind == ROW_FIELD; r++)
             step_over(&at, r);
         if (r->kind == ROW_REPEATED) {
-            snprintf(rows, sizeof rows, "%u n", row_bytes(r));
+            const unsigned each = row_bytes(r);
+            for (r++; r->kind == ROW_FIELD;)
+                r++;
+            if (r->kind == ROW_COLUMNS)
+                snprintf(rows, sizeof rows, "%u n, or %u n", each, each + row_bytes(r));
+            else
+                snprintf(rows, sizeof rows, "%u n", each);
             at.rows = rows;
         }
         print_place(&at);

@@ -27,6 +27,9 @@
 #define ROWS(name_, struct_) {.kind = ROW_REPEATED, .name = #name_},
 #define ROW(name_, struct_, member_, type_, unit_, about_)                                         \
     FIELD(name_, member_, type_, 1, 0, 0, 0, unit_, about_)
+#define COLUMNS(name_, struct_) {.kind = ROW_COLUMNS, .name = #name_},
+#define COLUMN(name_, struct_, member_, type_, since_, unit_, about_)                              \
+    FIELD(name_, member_, type_, 1, 0, 0, since_, unit_, about_)
 #define END(name_) {.kind = ROW_END, .name = #name_},
 const row schema_messages[] = {
 #include "record/messages.def"
@@ -127,6 +130,7 @@ const limit schema_limits[] = {
     {"text_bytes", PLR_WIRE_MAX_TEXT},
     {"settings", PLR_WIRE_MAX_SETTINGS},
     {"observations", PLR_WIRE_MAX_OBSERVATIONS},
+    {"not_seen_px", (double)PLR_NOT_SEEN_PX},
     {"imu_readings", PLR_WIRE_MAX_IMU},
     {"no_budget", PLR_NO_BUDGET},
     {"rejected_landmarks", PLR_SUPERVISION_REJECTED},

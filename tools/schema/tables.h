@@ -10,6 +10,7 @@ typedef enum row_kind {
     ROW_GROUP,
     ROW_FIELD,
     ROW_REPEATED, /* the fields behind it are those of a row, which is repeated */
+    ROW_COLUMNS,  /* those behind it were added to the rows later, and stand behind all of them */
     ROW_END
 } row_kind;
 

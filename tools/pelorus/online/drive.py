@@ -167,7 +167,7 @@ class Drive:
                 f.measure(datum.t_ns, sensor, datum.value, datum.sigma, datum.at_B_m)
             case Stereo():
                 return self._answered(
-                    datum, f.update(datum.t_ns, observations(datum.ids, datum.pixels))
+                    datum, f.update(datum.t_ns, observations(datum.ids, datum.pixels, datum.sigmas))
                 )
         return None
 
