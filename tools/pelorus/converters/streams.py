@@ -385,7 +385,7 @@ def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
         raise ForeignFileError(
             rig.path,
             f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
-            due="the calibration of these pictures is due",
+            due="the calibration of these pictures is needed",
         )
     return rig.of_size(*min(holding, key=np.prod))
 
