@@ -34,11 +34,10 @@ from pelorus import se3, wire
 from pelorus.check.contents import AHEAD, recording_of, write
 from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
-from pelorus.errors import PelorusError
 from pelorus.evaluation import world_laid
 from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo, Twist
 from pelorus.layout import Floats
-from pelorus.replay import run_program
+from pelorus.replay import NothingUsefulError, stuffed_answers
 from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory, estimate_in
@@ -159,12 +158,11 @@ class Parts:
         )
 
     def _estimate(self, part: _Part, options: Sequence[str]) -> Estimate | None:
-        answers = part.path.with_suffix(".answers")
         try:
-            run_program(self._program, part.path, ["--quiet", *options, "--out", str(answers)])
-        except PelorusError:  # not a frame of so short a part could be used
+            answers = stuffed_answers(self._program, part.path, options)
+        except NothingUsefulError:  # not a frame of so short a part could be used
             return None
-        return estimate_in(list(wire.only(wire.stuffed_of(answers), Kind.POSE)))
+        return estimate_in(list(wire.only(answers, Kind.POSE)))
 
 
 def _typical(values: Sequence[float]) -> float:
