@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from bags import Recorder
 from converted import Run, messages_of
+from draws import draws
 from pelorus import se3
 from pelorus.converters import wheels
 from pelorus.converters.wheels import STANDSTILL, WHEEL, Rolling
@@ -68,7 +69,7 @@ def test_a_body_that_cannot_slide_is_measured_along_all_axes() -> None:
 DARK = Span(10.0, 60.0)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", draws([1, 2]))
 def test_a_minute_in_the_dark_costs_a_percent_of_the_way_if_the_body_cannot_slide(
     seed: int, tmp_path: Path
 ) -> None:
