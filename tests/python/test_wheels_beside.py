@@ -152,7 +152,7 @@ def test_a_bags_wheels_go_beside_its_imu_along_their_own_axes(
 ) -> None:
     words = [*given, tmp_path / "out.plr"]
     outcome = pelorus(*words, "--wheel-topic", "/odom", status=1)
-    assert "/odom: messages tell no covariance; --wheel-sigma M/S is due" in outcome.err
+    assert "/odom: messages tell no covariance; --wheel-sigma M/S is expected" in outcome.err
     said = pelorus(*words, "--wheel-topic", "/odom", "--wheel-sigma", 0.05).out
     assert "/odom: the wheels sit as /tf_static says" in " ".join(said.split())
     assert "the wheels stand: " in said

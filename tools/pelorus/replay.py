@@ -130,7 +130,7 @@ def whole_log_of(source: Path, options: Sequence[str], programs: Path | None) ->
     """A result that says what became of its frames, too."""
     messages = result_of(source, options, programs)
     if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
-        raise PelorusError(f"{source}: holds no REPORT of a frame: a whole log is due")
+        raise PelorusError(f"{source}: holds no REPORT of a frame: a whole log is expected")
     return messages
 
 

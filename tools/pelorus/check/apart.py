@@ -9,7 +9,7 @@ where the noise is what the settings say, the difference of an estimate from hal
 best one from all of it has the covariance P_half - P_all, whatever noise (of the twists) both share
 (Hausman, Specification tests in econometrics, 1978). So the drive is cut into windows, each
 window's points into halves, left and right, upper and lower, near and far, and at random; each
-half's poses are compared with those from all points. 1 is due. Where they are farther apart,
+half's poses are compared with those from all points. 1 is expected. Where they are farther apart,
 the noises are made larger until they are not (halves_alike.py). A drive by an IMU is one window:
 each window would have to find the vertical and its speed anew.
 

@@ -61,7 +61,7 @@ class Outcome:
     used: int
     gated: int
     frames: int
-    nis: float  # a degree of freedom: 1 is due
+    nis: float  # a degree of freedom: 1 is expected
     bias: Floats  # at the end, (b_v, b_w)
     bias_variance: Floats
     contradicted: float = 0.0  # of the frames: in these vision contradicts twists or IMU
