@@ -390,7 +390,7 @@ def draws(poses: Path, klt: Path, first: int) -> Iterator[tuple[Recording, float
     source = matlab.klt(klt, TwistTiming.END)
     folders = poses.parent / "image_l", poses.parent / "image_r"
     pairs = images.pairs(*folders)
-    tracks = track((images.read(pair) for pair in pairs[first:]), folders, Settings())
+    tracks = track((images.read(pair) for pair in pairs[first:]), folders, Settings(corners=120))
     assert np.median(np.bincount(tracks.id)) >= 5
     T_CB, cameras = source.T_CB, trajectory.read_kitti(poses)
     bodies = se3.compose(se3.compose(se3.inverse(T_CB), cameras), T_CB).at(slice(first, None))
