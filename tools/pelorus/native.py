@@ -31,10 +31,8 @@ REJECTED = 24  # PLR_SUPERVISION_REJECTED
 
 
 def folders(chosen: Path | None) -> list[Path]:
-    """Returns the folders in which to look for programs and libraries.
-
-    That is the folder given, else $PELORUS_BIN, else the package, and build/bin here or in the
-    package's checkout.
+    """Returns the folders of programs and libraries: the one given, else $PELORUS_BIN, else the
+    package, and build/bin here or in the package's checkout.
     """
     named = chosen or (Path(value) if (value := os.environ.get("PELORUS_BIN")) else None)
     return [named] if named else [PACKAGED, BUILT, SOURCE_ROOT / BUILT]
@@ -142,8 +140,7 @@ class ReadingResult(Struct):
 
 @with_reasons
 class Report(Struct):
-    """The result of one stereo frame: plr_report of include/pelorus/types.h, which explains each
-    number.
+    """The result of one stereo frame: plr_report of include/pelorus/types.h.
 
     Its reasons are flags: `Reason.FROZEN_IMAGE in report.reasons`.
     """
@@ -274,9 +271,8 @@ class Supervision(Struct):
 
 @with_reasons
 class Health(Struct):
-    """How far the estimate may be trusted at some time, and why.
-
-    Seconds since an event that never happened are infinite.
+    """How far the estimate may be trusted at some time; seconds since what never happened are
+    infinite.
     """
 
     c_name = "plr_health_state"
@@ -422,9 +418,7 @@ OTHER_SIGNATURES: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
 
 
 class Library:
-    """The library in one precision.
-
-    Its functions are attributes, with the names of the header: `filter_update` is
+    """The library in one precision; its functions are attributes: `filter_update` is
     plr_filter_update.
     """
 
@@ -490,9 +484,7 @@ def _candidates(precision: Precision) -> Iterator[Path]:
 
 @cache
 def library(precision: Precision = "float32") -> Library:
-    """Returns the library in this precision, loaded once; raises PelorusError where there is
-    none.
-    """
+    """Returns the library in this precision, loaded once; PelorusError where there is none."""
     if precision not in NAMES:
         raise PelorusError(f"precision {precision!r}: one of {', '.join(NAMES)}")
     for path in _candidates(precision):

@@ -73,9 +73,7 @@ NOISES = "`pelorus check` on the recording writes noises that fit"
 
 @dataclass(frozen=True)
 class Remark:
-    """One finding with its grade. A note is about the search for settings and does not affect
-    the verdict.
-    """
+    """A finding with its grade; a note is about the search and does not affect the verdict."""
 
     grade: Grade
     text: str
@@ -169,7 +167,7 @@ class Run:
 
     @property
     def doubted_share(self) -> float:
-        """Returns the share of doubted frames, except by a pause of the readings or a bias off its
+        """Returns the share of frames doubted for other reasons than a pause or a bias off its
         prior.
 
         Those two are graded by themselves, and the covariance covers a pause.
@@ -260,9 +258,7 @@ def of_length(frames: int) -> Iterator[Remark]:
 
 
 def _health(run: Run) -> Iterator[Remark]:
-    """Yields remarks on lost and doubted frames; those before an IMU's start do not count as
-    lost.
-    """
+    """Yields remarks on lost and doubted frames; those before an IMU's start are not lost."""
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
     if run.lost_share > LOST_MANY or run.doubted_share > DOUBTED_HALF:
         grade = Grade.BAD
@@ -279,9 +275,7 @@ def _health(run: Run) -> Iterator[Remark]:
 
 
 def _order(run: Run) -> Iterator[Remark]:
-    """Yields a remark where the recording is not in the order of time, and no twist-delay mends
-    it.
-    """
+    """Yields a remark where times go back, and no twist-delay mends it."""
     refused = [m.subject for m in run.messages if isinstance(m, Report) and m.status == LATE]
     for late in late_ones(run.messages):
         if refused.count(late.kind):
@@ -289,9 +283,7 @@ def _order(run: Run) -> Iterator[Remark]:
 
 
 def _diverged(run: Run) -> Iterator[Remark]:
-    """Yields a remark where a variance is not positive: the arithmetic failed, which is the
-    worst.
-    """
+    """Yields a remark where a variance is not positive: the arithmetic failed."""
     frames = run.frames.t_ns[(run.frames.reasons & NOT_POSITIVE) != 0]
     if len(frames):
         first_s = (int(frames[0]) - run.origin_ns) * 1e-9
@@ -317,9 +309,7 @@ def _truth(run: Run) -> Iterator[Remark]:
 
 
 def _gate(run: Run) -> Iterator[Remark]:
-    """Yields a remark on the share of gated matches, and where in the drive it is far above the
-    usual.
-    """
+    """Yields a remark on the share of gated matches, and where it is far above the usual."""
     share = run.gated_share
     grade = Grade.BAD if share > GATED_MOST else Grade.CARE if share > GATED_MANY else Grade.GOOD
     words = f"the gate rejects {share:.1%} of the matches"
@@ -352,9 +342,7 @@ def _used(run: Run) -> Iterator[Remark]:
 
 
 def _nis(run: Run, known: Known) -> Iterator[Remark]:
-    """Yields a remark where the NIS exceeds 1; a smaller one is normal, for noises cover lasting
-    errors.
-    """
+    """Yields a remark where the NIS exceeds 1; noises that cover lasting errors make it smaller."""
     if not np.isfinite(run.nis):
         return
     words = f"what frames show differs from what was expected (innovations) by {run.nis:.2f} times "
@@ -368,9 +356,7 @@ def _nis(run: Run, known: Known) -> Iterator[Remark]:
 
 
 def _biases(run: Run) -> Iterator[Remark]:
-    """Yields remarks on biases beyond 3 sigma of their priors, where stereo and odometry
-    disagree.
-    """
+    """Yields remarks on biases beyond 3 sigma of their priors: stereo and odometry disagree."""
     by_imu = run.frames.by_imu
     if not (by_imu or in_force(run.messages, "bias")):
         return
@@ -453,9 +439,7 @@ def _halves(tuned: Tuned) -> Iterator[str]:
 
 
 def of_calibration(found: Calibration, own: Estimated | None = None) -> Iterator[Remark]:
-    """Yields what images and twists show of the camera; `own` is what the filter estimates of
-    it.
-    """
+    """Yields what images and twists show of the camera; `own` is the filter's estimate of it."""
     if found.scale is not None:
         yield from of_scale(found.scale)
     if own is not None:

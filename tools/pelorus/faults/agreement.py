@@ -64,9 +64,8 @@ def halved(recording: Recording, seen: Seen, lag: int) -> Seen:
 
 
 def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -> Agreement:
-    """Fits scale, lever and clock; assumes that the extrinsic's rotation and the units are right.
-
-    `seen` is the motion of the views, if it is known already.
+    """Fits scale, lever and clock; assumes that rotation and units are right. `seen` is the
+    views' motion, if it is known already.
     """
     seen = Seen.of(recording, views) if seen is None else seen
     if seen.usable.sum() < FRAMES_MIN:
