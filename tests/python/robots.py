@@ -57,7 +57,7 @@ class Drive:
 
 
 def drive(kind: str, by: str, seed: int) -> Drive:
-    """Of a kind of robot, with speeds, noises, rates, scene and place of the camera of its own."""
+    """Draws a drive of a kind of robot: speeds, noises, rates, scene and the camera's place."""
     chance = np.random.default_rng([seed, [*KINDS].index(kind), 7])
 
     def between(low: float, high: float) -> float:

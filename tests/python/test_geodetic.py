@@ -42,7 +42,7 @@ def centred(lat: Floats, lon: Floats, h: Floats) -> Floats:
 
 
 def east_north_up(lat: Floats, lon: Floats, h: Floats) -> Floats:
-    """Of the first one."""
+    """Returns metres east, north and up of the first place."""
     f, g = np.radians(lat[0]), np.radians(lon[0])
     axes = [
         [-np.sin(g), np.cos(g), 0],
@@ -54,7 +54,7 @@ def east_north_up(lat: Floats, lon: Floats, h: Floats) -> Floats:
 
 
 def meridian_m(lat: float) -> float:
-    """Of the equator, by Simpson's rule."""
+    """Returns the distance from the equator, by Simpson's rule."""
     f = np.linspace(0, np.radians(lat), 20001)
     own = A * (1 - E2) / (1 - E2 * np.sin(f) ** 2) ** 1.5
     weights = np.ones(len(f))

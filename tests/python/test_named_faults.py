@@ -112,7 +112,7 @@ def test_a_scene_that_moves_is_told_before_no_fit() -> None:
 
 
 def test_what_moves_fast_is_no_slot() -> None:
-    """Of a rover: 342 tracks seemed to go on with another point."""
+    """On a rover 342 tracks seemed to continue with another point."""
     change, due = OF_RECORDINGS["moving"]
     assert found_in(change(everyday_drive(drawn(9702), 9702), 2))[0].name in due
 
@@ -135,7 +135,7 @@ def test_of_few_points_a_long_drive_is_looked_at() -> None:
 
 
 def test_degrees_that_go_round_between_two_frames_are_degrees() -> None:
-    """Of a drone: 46 rad/s. A lever made them a scale of the velocities, and km/h."""
+    """A drone with 46 rad/s: a lever made the degrees a scale of the velocities, and km/h."""
     change, _ = OF_RECORDINGS["degrees"]
     said = found_in(change(everyday_drive(drawn(7004), 7004), 0))
     assert [fault.name for fault in said] == ["unit-degrees"]

@@ -158,7 +158,7 @@ def test_frames_before_an_imu_has_started_are_not_drawn_as_lost() -> None:
 
 
 def graded(log: list[Message], words: str) -> Grade:
-    """Of the one remark with these words, whatever the recording itself tells."""
+    """Returns the grade of the one remark with these words, whatever the recording itself shows."""
     (remark,) = [
         remark
         for remark in verdict.verdict_of(verdict.Run.of(log), Known()).remarks

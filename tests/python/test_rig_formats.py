@@ -260,7 +260,7 @@ def opencv_xml(cameras: Cameras, folder: Path) -> list[Path]:
 
 
 def zed(cameras: Cameras, folder: Path) -> list[Path]:
-    """Of three resolutions, the one of the pictures in the middle."""
+    """Writes three resolutions, the pictures' one in the middle."""
     rx, cv, rz = Rotation.from_matrix(cameras.T_RL.R).as_rotvec()
     baseline, ty, tz = -1e3 * cameras.T_RL.p
     text = ""

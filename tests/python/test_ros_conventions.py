@@ -30,8 +30,9 @@ def built(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def error_and_covariances(seed: int) -> tuple[Floats, Floats]:
-    """Of the last frame's pose of the base in odom: the error (6,) and the covariance, as ROS has
-    them. The robot is told where it begins, with an error of the covariance that it is told.
+    """Returns error (6,) and covariance of the last frame's pose of the base in odom, as in ROS.
+
+    The robot is told where it begins, with an error drawn from the covariance that it is told.
     """
     chance = np.random.default_rng(seed)
     recording = simulate(

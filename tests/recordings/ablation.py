@@ -30,7 +30,7 @@ Outcomes = dict[str, tuple[bool, Phases]]
 
 
 def campaign(program: Path, seeds: int, without: str) -> Outcomes:
-    """Verdict, and for each phase GOOD, silent, error and own sigma."""
+    """Returns by scenario the verdict, and for each phase GOOD, silent, error and own sigma."""
     command = [str(program), "--seeds", str(seeds), "--jobs", "1", "--scenario", SCENARIOS]
     command += ["--policy", "own"]
     command += ["--without", without] if without else []

@@ -41,7 +41,7 @@ Defect = Callable[[Recording, Chance], Recording]
 
 
 def _lasting(count: int, columns: int, keeps: float, chance: Chance) -> Floats:
-    """Noise of variance 1 that keeps so much of itself from one row to the next."""
+    """Returns noise of variance 1 that keeps the share `keeps` from one row to the next."""
     out = chance.normal(size=(count, columns))
     for k in range(1, count):
         out[k] = keeps * out[k - 1] + np.sqrt(1 - keeps**2) * out[k]
@@ -54,7 +54,7 @@ def _with_pixels(drive: Recording, off: Floats) -> Recording:
 
 
 def _by_track(drive: Recording, of: Callable[[Floats], Floats]) -> Recording:
-    """`of`: what is added to the pixels of one track, from frame to frame."""
+    """Adds to the pixels of each track what `of` returns for its frames."""
     off = np.zeros_like(drive.tracks.pixels)
     for id in np.unique(drive.tracks.id):
         rows = np.nonzero(drive.tracks.id == id)[0]
@@ -63,7 +63,7 @@ def _by_track(drive: Recording, of: Callable[[Floats], Floats]) -> Recording:
 
 
 def none(drive: Recording, _: Chance) -> Recording:
-    """White noise all along."""
+    """Leaves the noise white."""
     return drive
 
 
@@ -84,7 +84,7 @@ def heavy(drive: Recording, chance: Chance) -> Recording:
 
 
 def bent(drive: Recording, chance: Chance) -> Recording:
-    """A lens: what a point is off by depends on where it is seen."""
+    """Adds a lens error, which depends on the place in the picture."""
     x, y = (drive.tracks.pixels[:, :2] / (376, 240) - 1).T
     off = np.zeros_like(drive.tracks.pixels)
     off[:, 2] = chance.uniform(0.3, 1.0) * (1.5 * x * y + 0.5 * x)

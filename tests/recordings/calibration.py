@@ -39,7 +39,7 @@ TURN_RAD = np.radians(0.3) / np.sqrt(3) * np.array([1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Wrong:
-    """What the HEADER says of focal length, baseline and T_CB, and the clock of the frames."""
+    """The HEADER's errors of focal length, baseline and T_CB, and that of the frames' clock."""
 
     focal: float = 0.0
     baseline: float = 0.0
@@ -66,7 +66,7 @@ class Wrong:
         return message
 
     def due(self) -> Floats:
-        """What the filter should correct: plr_calibration_error."""
+        """Returns the corrections that are expected of the filter: plr_calibration_error."""
         out = np.zeros(len(PARTS))
         out[:2] = 1 / (1 + self.baseline) - 1, 1 / (1 + self.focal) - 1
         out[2:5] = -self.turned * TURN_RAD

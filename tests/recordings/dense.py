@@ -56,7 +56,7 @@ class Eye:
         return np.stack([u, v, right, v], axis=1), np.stack(seen, axis=1)
 
     def lay(self, count: int, t_ns: int, rng: np.random.Generator) -> Floats:
-        """New points that the left camera sees, in the world."""
+        """Returns new points in the world that the left camera sees."""
         R, p = self.pose(t_ns)
         c, size = self.header.camera, (self.header.image_width_px, self.header.image_height_px)
         u, v = rng.uniform(0, size, (count, 2)).T

@@ -62,7 +62,7 @@ def simulated(seeds: range) -> Iterator[Drive]:
 
 
 def real(cache: Path) -> Iterator[Drive]:
-    """With the settings that belong to them; of the longer ones the first minutes."""
+    """Yields real drives with their settings; of the longer ones the first minutes."""
     for case in cases():
         fits = "default" not in case.name and "starry" not in case.name  # that one is dark at times
         if (DATA / case.file).exists() and fits:
@@ -77,7 +77,7 @@ def _first(messages: Messages, length_s: float) -> Messages:
 
 
 def explained(program: Path, messages: Messages, options: Sequence[str]) -> Explanation:
-    """What is said of a replay."""
+    """Explains a replay."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "in.plr"
         write_file(path, [m for m in messages if m.kind != Kind.END], len(messages))
@@ -94,8 +94,9 @@ class Tried(NamedTuple):
 
 
 def tried(program: Path, drive: Drive, event: Event, own: Explanation) -> Tried | None:
-    """None where it does not fit the drive. `own` is what is told of the drive without it: what a
-    real drive has by itself is not counted again.
+    """Tries an event in a drive; None where it does not fit.
+
+    `own` is the drive's explanation without it: findings of a real drive itself do not count.
     """
     if not _fits(event, drive, own):
         return None
@@ -125,13 +126,13 @@ def tried(program: Path, drive: Drive, event: Event, own: Explanation) -> Tried 
 
 def _fits(event: Event, drive: Drive, own: Explanation) -> bool:
     by_imu = header_of_messages(drive.messages).process is Process.IMU
-    if event.whole and own.setup:  # its settings do not fit as they are
+    if event.whole and own.setup:  # its own settings do not fit
         return False
     return event.wheels is None or event.wheels != by_imu
 
 
 def good_share(found: Explanation) -> float:
-    """Of the frames, by the filter's own health."""
+    """Returns the share of the frames that are GOOD by the filter's own health."""
     return found.health.by_health[schema.HEALTHS[GOOD]] / found.health.frames
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Events that are put into a recording: what goes wrong, from when on, as messages in their order.
+"""Events that are injected into a recording's messages: what goes wrong, and when.
 
-Each takes the messages, the time when it begins, and chance; the size is drawn, so that no rule can
+Each takes the messages, its begin, and a random generator; the size is drawn, so that no rule can
 fit one number. All work on any recording, simulated or real.
 """
 
@@ -25,8 +25,10 @@ DATA = (*MOTION, Kind.STEREO, Kind.TRUTH, Kind.READING)
 
 
 class Event(NamedTuple):
-    """`told` are the names of causes that are right; `wheels`: it needs twists; `settings` go to
-    the replay beside what is done to the messages.
+    """An event to inject.
+
+    `told` are the names of right causes; `wheels`: whether it needs twists; `settings` are for the
+    replay.
     """
 
     name: str
@@ -209,7 +211,7 @@ def shock(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def _largest(messages: Messages, kind: Kind) -> tuple[float, float]:
-    """Of the two vectors of a reading, any component."""
+    """Returns the largest component of each of the two vectors of readings."""
     readings = [m for m in messages if m.kind == kind]
     if not readings:
         return 0.0, 0.0
@@ -221,7 +223,7 @@ def _largest(messages: Messages, kind: Kind) -> tuple[float, float]:
 
 
 def unchanged(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
-    """Nothing happens to the messages."""
+    """Leaves the messages unchanged."""
     return messages
 
 
@@ -253,9 +255,7 @@ EVENTS = (
 
 
 def moving(messages: Messages, for_s: float = 4.0) -> Iterator[int]:
-    """Times from which on the picture moves for a while as it mostly does: where something that
-    happens shows.
-    """
+    """Yields times from which the picture moves for a while as usual, so that an event shows."""
     frames = [m for m in messages if isinstance(m, Stereo)]
     flow = np.array([_flow(a, b) for a, b in pairwise(frames)])
     t = np.array([m.t_ns for m in frames[1:]])
@@ -268,7 +268,7 @@ def moving(messages: Messages, for_s: float = 4.0) -> Iterator[int]:
 
 
 def _flow(a: Stereo, b: Stereo) -> float:
-    """Mean way of the points that both pictures have, px."""
+    """Returns the mean motion of the points in both pictures, px."""
     _, i, j = np.intersect1d(a.ids, b.ids, return_indices=True)
     if len(i) < 5:
         return 0.0

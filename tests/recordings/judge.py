@@ -66,8 +66,10 @@ Figures = dict[str, float]
 
 @dataclass(frozen=True)
 class Case:
-    """A recording, how it is converted (nothing: it is a .plr already), the options of its replay,
-    and the figure by which two runs of it are compared.
+    """A recording with the figure by which its runs are compared.
+
+    It has the command that converts it (empty: it is a .plr already), and the options of its
+    replay.
     """
 
     name: str
@@ -78,12 +80,12 @@ class Case:
 
 
 def conf(name: str) -> tuple[str, ...]:
-    """The options of a config file in tools/config."""
+    """Returns the options of a config file in tools/config."""
     return ("--config", str(ROOT / f"tools/config/{name}.conf"))
 
 
 def cases() -> Iterator[Case]:
-    """What development may look at; other recordings are run where the work is judged."""
+    """Yields the recordings for development; the work is judged on others."""
     for drive in DRIVES:
         file = f"klt/2011_{drive}_sync_KLT.mat"
         yield Case(f"klt {drive}", file, ("klt",), (*conf("klt"), "--start-sigma", "0.01"))
@@ -154,7 +156,7 @@ def people(folder: Path) -> Iterator[Case]:
 
 
 def worst_of(found: Sequence[Figures]) -> Figures:
-    """Of each figure the worst."""
+    """Returns the worst of each figure."""
     names = {name: None for one in found for name in one}
     return {
         name: (min if name in LEAST_IS_WORST else max)(one.get(name, np.nan) for one in found)
@@ -166,7 +168,7 @@ def worst_of(found: Sequence[Figures]) -> Figures:
 
 
 def converted(case: Case, folder: Path) -> Path:
-    """Converted once a folder."""
+    """Returns the converted recording, made once a folder."""
     source = DATA / case.file
     if not case.convert:
         return source
@@ -192,7 +194,7 @@ def run(program: Path, recording: Path, options: Sequence[str]) -> list[Message]
 
 
 def figures(messages: list[Message]) -> Figures:
-    """What a log comes to."""
+    """Returns the figures of a log."""
     answers = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STEREO]
     reports = {m.t_ns: m for m in answers if m.status == 0}
     found, truth = estimate_in(messages), truth_in(messages)
@@ -210,7 +212,7 @@ def figures(messages: list[Message]) -> Figures:
         return out
     with np.errstate(divide="ignore", invalid="ignore"):
         sigmas = np.abs(accuracy.error) / accuracy.sigma
-    sigmas[0] = 0  # aligned there
+    sigmas[0] = 0  # the alignment makes them zero
     out |= {"ATE": accuracy.ate_m, "err0": accuracy.err0_m}
     out["NEES/6"] = accuracy.nees_per_dof or np.nan
     out["worst"] = float(np.linalg.norm(accuracy.estimate.p - accuracy.truth.p, axis=1).max())
@@ -220,7 +222,7 @@ def figures(messages: list[Message]) -> Figures:
 
 
 def _honesty(reports: Sequence[Report | None], worst: Floats) -> Figures:
-    """Whether health fits the error, which is given in sigmas, its largest component."""
+    """Returns whether health fits the error, whose largest component is given in sigmas."""
     good = np.array([report is not None and report.health == GOOD for report in reports])
     seen = np.array([report is not None and report.used >= 3 for report in reports])
     started = np.array([report is None or not report.reasons & NOT_STARTED for report in reports])

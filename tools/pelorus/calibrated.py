@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The CALIBRATION of docs/REPLAY-FORMAT.md: what the filter has estimated of it on the way."""
+"""The CALIBRATION of docs/REPLAY-FORMAT.md: the filter's online estimate of the calibration."""
 
 from __future__ import annotations
 
@@ -64,14 +64,16 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
         return cls(camera=camera, **values)
 
     def parts(self) -> Iterator[tuple[Part, float, float]]:
-        """Of what is estimated: by how much it has been corrected, and what may be left."""
+        """Yields each estimated part with its correction and its remaining sigma, in the part's
+        unit.
+        """
         for k, part in enumerate(PARTS):
             if self.estimated >> k & 1:
                 yield part, self.corrected[k] * part.scale, self.sigma[k] * part.scale
 
     @property
     def figures(self) -> Figures:
-        """By the keys of MEANING."""
+        """Returns the figures by the keys of MEANING."""
         return {
             f"calibrated_{part.key}{end}": float(x)
             for part, value, sigma in self.parts()
@@ -80,12 +82,12 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
 
     @property
     def offset_s(self) -> float:
-        """What the setting camera-offset should be larger by."""
+        """Returns the amount to add to the setting camera-offset, s."""
         return float(self.corrected[-1]) if self.estimated >> len(PARTS) - 1 & 1 else 0.0
 
 
 def last_calibrated(messages: Iterable[Message]) -> Calibrated | None:
-    """What a log says last of it; None if nothing was estimated."""
+    """Returns a log's last estimate; None if nothing was estimated."""
     found = None
     for message in messages:
         if isinstance(message, Calibrated):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A calibration as JSON: what a HEADER needs, by name."""
+"""Reads a calibration from JSON: the named values of a HEADER."""
 
 from __future__ import annotations
 
@@ -26,12 +26,14 @@ IMAGE_SIZE_MAX = 65535
 
 
 def read(path: Path) -> Header:
-    """The HEADER that the file describes; unknown names are refused, they may be typing errors."""
+    """Returns the HEADER that the file describes; refuses unknown names, for they may be typing
+    errors.
+    """
     return _Calibration(path, foreign.json_object(path)).header()
 
 
 def read_extrinsic(path: Path) -> Poses:
-    """T_CB of a file that holds nothing else, or of a whole calibration."""
+    """Returns T_CB from a file that has nothing else, or from a whole calibration."""
     return _Calibration(path, foreign.json_object(path)).extrinsic()
 
 

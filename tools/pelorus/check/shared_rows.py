@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A pair whose rows show that its rectification is off needs a larger pixel-sigma."""
+"""Enlarges pixel-sigma where the rows of a pair show that its rectification is off."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ SETTING = "pixel-sigma"
 
 
 def with_shared_rows(bench: Bench, tuned: Tuned) -> Tuned:
-    """The same with at least the sigma that the rectification leaves, unless it is about that.
+    """Returns the settings with at least the sigma that the rectification's error needs.
 
-    It comes before halves of the points are compared (halves_alike.py), for here it is known whose
-    error it is. As there, no sigma is taken that makes the filter surer.
+    It comes before halves of the points are compared (halves_alike.py), for here the source of the
+    error is known. No sigma is taken that makes the filter surer.
     """
     shared_px = tuned.noise.rows_px
     if SETTING not in tuned.settings or not shared_px > 0:

@@ -81,7 +81,7 @@ def compare_log(
     state: Path | None = None,
     as_json: bool = False,
 ) -> Verdict:
-    """Tell what differs, and how it ends."""
+    """Prints the differences, and returns the verdict."""
     desk = Desk(find_programs(programs), start, state)
     with err.status(f"reading {escape(str(path))}"):
         log = read_log(path)

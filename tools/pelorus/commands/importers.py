@@ -31,7 +31,7 @@ from pelorus.rig.lens import LensModel
 
 OWN_DATA = "Your own data"
 RADIUS_MAX_M = 5.0
-# The options of all of them; a command gets what they say as its argument `asked`.
+# The options of all of them; a command gets their values as its argument `asked`.
 SHARED: dict[str, tuple[Any, Any]] = {
     "calibration": (list[Path], own.CALIBRATION),
     "extrinsic": (Path | None, own.EXTRINSIC),
@@ -52,14 +52,14 @@ SHARED: dict[str, tuple[Any, Any]] = {
 
 
 class Stamps(StrEnum):
-    """Of a bag's messages."""
+    """Times of a bag's messages: of their headers, or of their arrival."""
 
     HEADER = bag.HEADER
     LOG = bag.LOG
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to `convert`."""
+    """Adds the commands to `convert`."""
     for name, command, example in (
         ("euroc", _euroc, "V1_01_easy V1_01.plr"),
         ("ros", _ros, "drive.mcap drive.plr --calibration camchain.yaml"),
@@ -278,7 +278,7 @@ def _ros(
 
 
 def _require_imu(wheel_topic: str, twist_topic: str, joint_topic: str) -> None:
-    """PelorusError where another topic than an IMU's would move the body, beside wheels."""
+    """Raises PelorusError where another topic than an IMU's would move the body, beside wheels."""
     if wheel_topic and joint_topic:
         raise PelorusError(
             "--wheel-topic and --joint-topic: both are wheels, one of them is expected"
@@ -308,7 +308,7 @@ def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | No
 
 
 def converted(found: Streams, timing: TwistTiming | None, fix: bool, target: Path) -> None:
-    """Say what was remarked, make the recording, write it."""
+    """Prints the remarks, makes the recording, and writes it."""
     for remark in found.told:
         out.print(escape(remark))
     write(*streams.converted(found, timing, fix), target)

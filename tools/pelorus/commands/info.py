@@ -102,7 +102,7 @@ def _show_config(config: Config, count: int) -> None:
 
 
 def _show_calibrated(told: Calibrated, configs: list[Config]) -> None:
-    """What was estimated, and the calibration with it, to be taken over."""
+    """Prints what was estimated, and the calibration with it, to be copied."""
     table = Table("calibration, estimated", "corrected by", "+-", "", box=None, pad_edge=False)
     for part, value, sigma in told.parts():
         table.add_row(part.name, f"{value:+.4f}", f"{sigma:.4f}", part.unit)

@@ -59,7 +59,7 @@ def run(target: Path, **given: Any) -> None:
 
 
 def _parameters(settings: type, panel: str | None) -> Iterator[inspect.Parameter]:
-    """The command's parameters for a dataclass of settings, in their order."""
+    """Yields the command's parameters for a dataclass of settings, in their order."""
     types, defaults = get_type_hints(settings), settings()
     for name, about in settings_of(settings).items():
         default, kind, option = getattr(defaults, name), types[name], option_name(name)
@@ -79,7 +79,7 @@ def _parameters(settings: type, panel: str | None) -> Iterator[inspect.Parameter
 
 
 def _of_sensor(sensor: SmallSensor) -> Iterator[inspect.Parameter]:
-    """The parameters of Sensing, with what this sensor has where they are empty."""
+    """Yields the parameters of Sensing, with this sensor's defaults."""
     units = dict.fromkeys(sensor.unit(letter) for letter in sensor.letters)
     shown = {"sigma": ",".join(units).replace("ps", "/s").upper(), "axes": f"[{sensor.letters}]"}
     usual = {
@@ -105,7 +105,7 @@ def _of_sensor(sensor: SmallSensor) -> Iterator[inspect.Parameter]:
 
 
 def _sensing(sensor: SmallSensor, given: dict[str, Any]) -> dict[str, Any]:
-    """The fields of Sensing. What is as the table has it stays empty."""
+    """Returns the fields of Sensing; those with the table's values stay empty."""
     usual = {p.name: p.default.default for p in _of_sensor(sensor)}
     types = get_type_hints(Sensing)
     found = {}
@@ -132,7 +132,7 @@ def _parameter(
 
 
 def _values(settings: type, given: dict[str, Any]) -> dict[str, Any]:
-    """The fields of the dataclass from what was given on the command line."""
+    """Returns the fields of the dataclass from the command line's values."""
     return {name: _value(name, given) for name in settings_of(settings)}
 
 
@@ -153,7 +153,7 @@ def _span(name: str, from_s: float | None, for_s: float) -> Span | None:
 
 
 def _tell_blindness(recording: Recording) -> None:
-    """A recording of nothing is no recording; where a part of it is blind, say so."""
+    """Prints which part of a recording has no observations; refuses one that has none at all."""
     trouble = blindness(recording)
     if trouble and not len(recording.tracks):
         raise PelorusError(trouble)

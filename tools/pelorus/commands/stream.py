@@ -136,7 +136,7 @@ def stream(
 
 
 def _first_frames(messages: list[Message], frames: int | None) -> list[Message]:
-    """The recording up to and with its n-th stereo frame."""
+    """Returns the recording up to and with its n-th stereo frame."""
     stereos = [at for at, message in enumerate(messages) if message.kind == Kind.STEREO]
     if frames is None or frames >= len(stereos):
         return messages
@@ -153,7 +153,7 @@ def _how_far(outcome: Outcome, messages: list[Message]) -> str:
 
 @contextmanager
 def _ended_in_order() -> Iterator[None]:
-    """A request to terminate ends the drive as Ctrl-C does: with it goes the emulator."""
+    """Ends the drive at a request to terminate as at Ctrl-C, which also ends the emulator."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -225,7 +225,7 @@ def _display(messages: list[Message]) -> Iterator[_Display]:
 
 
 def _tell(outcome: Outcome, record: Path | None) -> None:
-    """A line for each thing, never cut: a board's own words and a path may be long."""
+    """Prints a line for each thing, never cut: a board's own words and a path may be long."""
     for name, words in _summary(outcome, record):
         out.print(f"{name:<8}  {words}", markup=False)
 

@@ -32,13 +32,17 @@ LOCAL_MAX_M = 1e5  # farther off, east and north are no plane's
 
 @dataclass
 class Ground:
-    """`crs` is what the user named; all files share the origin, the first place that was read."""
+    """The common ground of all files: `crs` is what the user named, the origin is the first
+    place read.
+    """
 
     crs: str = ""
     origin_m: Floats | None = None  # geocentric
 
     def local(self, path: Path, places: Floats, remarks: list[str]) -> Floats:
-        """(n, 3) longitude, latitude, height, or easting, northing, height -> m, east north up."""
+        """Returns (n, 3) m east, north, up of longitude, latitude, height or easting, northing,
+        height.
+        """
         crs = self.system()
         from pyproj import Transformer  # noqa: PLC0415 - an extra
 
@@ -66,7 +70,7 @@ class Ground:
         return found
 
     def system(self) -> CRS:
-        """What the numbers are of."""
+        """Returns the coordinate system of the numbers."""
         with extra("pyproj"):
             from pyproj import CRS  # noqa: PLC0415 - an extra
             from pyproj.exceptions import CRSError, ProjError  # noqa: PLC0415
@@ -81,7 +85,7 @@ class Ground:
 
 
 def localise(table: Table, ground: Ground) -> None:
-    """Give a file with places on the earth the columns of local metres."""
+    """Gives a table with places on the earth the columns of local metres."""
     if any(map(table.has, LOCAL)):
         return
     by_degrees = all(map(table.has, DEGREES))

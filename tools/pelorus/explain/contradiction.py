@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where pictures and odometry parted, measured anew: what the supervisor doubted is looked at by
-the motion that the stereo pairs alone show.
+"""Measures anew where pictures and odometry differ, by the motion of the stereo pairs alone.
 
 A frame is suspect if the supervisor says so, or if the gate rejected most of it. From some seconds
-before on, each step between two frames is compared: by the pictures, and by twists or gyro. What is
-usual between the two is learnt on the seconds before. Where the median of seven steps is off,
+before, each step between two frames is compared: by the pictures, and by twists or gyro. Their
+usual difference is learnt on the seconds before that. Where the median of seven steps is off,
 wheels slip or a gyro is wrong; one step that is off alone is a jump.
 """
 
@@ -25,36 +24,34 @@ from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 from pelorus.visual_motion import PAIRS_MIN, distance2, estimate, rigid, seen_pairs
 
-APART_S = 2.0  # stretches with less between them are one
+APART_S = 2.0  # stretches with a shorter gap are joined
 LOOK_BACK_S = 2.0  # before the supervisor is sure
-LEARN_S = 5.0  # of what is usual, before that
+LEARN_S = 5.0  # before that, from which the usual difference is learnt
 LEARN_LEAST = 10  # steps
 LOOK_ON_S = 4.0
-LOOK_MOST_S = 30.0  # of what lasts on, to tell how long
-SIGMAS = 8.0  # of six numbers a step: chance does not reach it; learnt sigmas are rough
-MEDIAN_OF = 7  # steps: what their median differs by lasts
-MEDIAN_SIGMA = 1.2533  # of the median of many, times the root of their number, over one's sigma
-TOLD_SIGMAS = 4.0  # of the odometry, as a median: less is for the supervisor to doubt, not to tell
+LOOK_MOST_S = 30.0  # longest part of a lasting difference that is examined
+SIGMAS = 8.0  # limit for the six numbers of a step: learnt sigmas are rough
+MEDIAN_OF = 7  # steps: a difference of their median lasts
+MEDIAN_SIGMA = 1.2533  # sigma of a median of many, times the root of their number, over one's sigma
+TOLD_SIGMAS = 4.0  # of the odometry, for a median; the supervisor doubts smaller ones
 DOUBTS = (1, 2)  # departed, contradicted
 PIXEL_MOST_PX = 1e5  # no picture is larger
 SCALE_SIGMA = 0.03  # of a velocity: how well its scale is known
 SLOW_PX = 0.5
-NEAR_D2 = 4 * 13.28  # of a point that agrees with a motion: chance of one in 100 at 2 px
+NEAR_D2 = 4 * 13.28  # d^2 of a point that agrees with a motion: probability of one in 100 at 2 px
 MAD = 1.4826  # of a normal distribution: sigma over the median absolute deviation
 
 
 class Steps(NamedTuple):
-    """From frame `first + k` to the next: velocities (v, w) in the body, by each."""
+    """Body velocities (v, w) from frame `first + k` to the next, by pictures and by odometry."""
 
     first: int
     by_pictures: Floats  # (n, 6); NaN where too few points show it
-    by_odometry: (
-        Floats  # (n, 6); an IMU has no velocity: what the pictures mostly show stands there
-    )
+    by_odometry: Floats  # (n, 6); an IMU has no velocity: there it is the pictures' usual one
 
 
 def contradictions(log: Log) -> Iterator[Finding]:
-    """One for each stretch of suspect frames that differs from what was before it."""
+    """Yields a finding for each stretch of suspect frames that differs from what was before it."""
     if not len(log.readings):
         return
     for first, last in _stretches(log):
@@ -85,7 +82,7 @@ def _looked_at(log: Log, first: int, last: int) -> Finding | None:
     learn: Flags = np.asarray(log.t_ns[low + 1 : high] < begin - LOOK_BACK_S * S)
     known: Flags = np.asarray(np.isfinite(off).all(axis=1))
     if np.count_nonzero(learn & known) < LEARN_LEAST:
-        learn[: max(first - low - 2, 0)] = True  # a drive that has just begun
+        learn[: max(first - low - 2, 0)] = True  # for a drive that has just begun
     if np.count_nonzero(learn & known) < LEARN_LEAST:
         return _as_told(log, first, last)
     usual = np.median(off[learn & known], axis=0)
@@ -101,8 +98,9 @@ def _looked_at(log: Log, first: int, last: int) -> Finding | None:
 
 
 def _as_told(log: Log, first: int, last: int) -> Finding | None:
-    """Where too few points were in sight before to measure it: as the supervisor has it, if what it
-    doubts is the odometry, and agreed with it before.
+    """Returns the supervisor's finding where too few points were seen before to measure one.
+
+    It must doubt the odometry, and have agreed with it before.
     """
     doubted = [e for e in log.evidence[first : last + 1] if e is not None and e.doubt in DOUBTS]
     if not doubted:
@@ -122,9 +120,11 @@ def _as_told(log: Log, first: int, last: int) -> Finding | None:
 
 
 def _least_sigma(log: Log, steps: Steps) -> Floats:
-    """(n, 6): what a difference is never less uncertain than. The sigmas of the readings, as usual
-    on this drive; some per cent of the motion, for wheels and cameras are calibrated no better; of
-    a turn what half a pixel is, by which tracks may wander together.
+    """Returns (n, 6) lower limits of the differences' sigmas.
+
+    They are the usual sigmas of the readings on this drive; some per cent of the motion, for wheels
+    and cameras are calibrated no better; and for turns half a pixel, by which tracks may drift
+    together.
     """
     told = np.nan_to_num(np.abs(steps.by_odometry))
     motion = np.maximum(told, np.nan_to_num(np.abs(steps.by_pictures)))
@@ -139,7 +139,7 @@ def _least_sigma(log: Log, steps: Steps) -> Floats:
 
 
 def _lasting(off: Floats) -> Floats:
-    """By how many of its own sigmas the median of the next steps is off, for each step (n, 6)."""
+    """Returns (n, 6) by how many of its sigmas the median of the next steps is off."""
     out = np.zeros_like(off)
     for k in range(len(off) - MEDIAN_OF + 1):
         window = off[k : k + MEDIAN_OF]
@@ -162,10 +162,12 @@ def _jump(log: Log, steps: Steps, k: int) -> Finding:
 
 
 def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, int]) -> Finding:
-    """Pictures and odometry differ from step k on; told where they differ most, soon after."""
+    """Returns the finding that pictures and odometry differ from step k on, with its early
+    maximum.
+    """
     soon = lasting[k : k + MEDIAN_OF]
     times = soon.max(axis=0)
-    along = times[:3] > SIGMAS  # wheels that slip turn wrongly, too
+    along = times[:3] > SIGMAS  # slipping wheels turn wrongly, too
     axis = int(np.argmax(times[:3] if along.any() and not log.by_imu else times))
     worst = k + int(np.argmax(soon[:, axis]))
     near = slice(max(worst - MEDIAN_OF // 2, 0), worst + MEDIAN_OF // 2 + 1)
@@ -189,7 +191,9 @@ def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, i
 
 
 def _end(log: Log, steps: Steps, k: int, lasting: Floats, last: int) -> int:
-    """Until when the two differ, which may be less than the doubt; the doubt's end if unseen."""
+    """Returns when the difference ends, which may be before the doubt; the doubt's end if not
+    seen.
+    """
     off = np.flatnonzero((lasting[k:] > SIGMAS).any(axis=1))
     apart = np.flatnonzero(np.diff(off) > MEDIAN_OF)
     end = k + int(off[apart[0]] if len(apart) else off[-1])
@@ -198,7 +202,7 @@ def _end(log: Log, steps: Steps, k: int, lasting: Floats, last: int) -> int:
 
 
 def measured(log: Log, low: int, high: int) -> Steps:
-    """The steps between the frames from `low` to below `high`."""
+    """Returns the steps between the frames from `low` to below `high`."""
     t = log.t_ns[low:high]
     tau = np.diff(t)[:, None] / S
     tau = np.where(tau > 0, tau, np.nan)
@@ -212,9 +216,10 @@ def measured(log: Log, low: int, high: int) -> Steps:
 
 
 def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Flags]:
-    """In the body, and of which steps enough points show it. The search begins where the filter
-    says that the body went, where odometry says so, and where the points in space fit best: what
-    most points agree with holds.
+    """Returns the body's motions by the pictures, and which steps have enough points.
+
+    The search starts from the filter's motion, from the odometry's, and from the best fit of the
+    points in space; the result is the one with which most points agree.
     """
     frames = log.frames[low:high]
     count = len(frames)
@@ -242,12 +247,14 @@ def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Fla
             np.where(better[:, None, None], found.R, best.R),
             np.where(better[:, None], found.p, best.p),
         )
-    enough = (most >= PAIRS_MIN) & (3 * most >= 2 * seen.counts())  # else it is not known
+    enough = (most >= PAIRS_MIN) & (3 * most >= 2 * seen.counts())  # else it is unknown
     return turned(there, best, T_CB), np.asarray(enough)
 
 
 def _by_filter(log: Log, low: int, high: int) -> Poses:
-    """How the filter's pose went from frame to frame; where a frame was refused it stood still."""
+    """Returns the motions of the filter's pose from frame to frame; none where a frame was
+    refused.
+    """
     R, p = np.eye(3), np.zeros(3)
     rows = []
     for pose in log.poses[low:high]:
@@ -259,7 +266,7 @@ def _by_filter(log: Log, low: int, high: int) -> Poses:
 
 
 def _by_odometry(log: Log, t: Times) -> Poses:
-    """By twists, or by the gyro alone."""
+    """Returns the motions by twists, or by the gyro alone."""
     order = np.argsort(log.reading_ns, kind="stable")
     stamps, readings = log.reading_ns[order], log.readings[order]
     v = np.zeros_like(readings[:, :3]) if log.by_imu else readings[:, :3]
@@ -268,7 +275,7 @@ def _by_odometry(log: Log, t: Times) -> Poses:
 
 
 def _smooth(values: Floats) -> Floats:
-    """Of each number the median of eleven around it, without those that are not known."""
+    """Returns the moving median of eleven values, ignoring unknown ones."""
     out = np.full_like(values, np.nan)
     for k in range(len(values)):
         around = values[max(k - 5, 0) : k + 6]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""All that is found in a log, put together: episodes with their first cause, what followed, and
-what was seen before.
+"""Collects all findings of a log in episodes: first cause, consequences, and what was seen
+before.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 NOT_POSITIVE = schema.number("reason", "NOT_POSITIVE")
 
-APART_NS = S  # what begins later than that after the end of another is an episode of its own
-TOGETHER_NS = S  # what begins within is told in the order of causes
-BEFORE_NS = S  # what was seen before: the last second
+APART_NS = S  # what begins this long after the end of another is an episode of its own
+TOGETHER_NS = S  # of events within a second the one that causes the others comes first
+BEFORE_NS = S  # figures are given for the last second before
 LINES = 20
-LASTS_S = 0.05  # what is shorter is a moment
+LASTS_S = 0.05  # anything shorter is called a moment
 EPISODES_TOLD = 4
 SPELLS_TOLD = 3
 TEXTS_TOLD = 3
@@ -40,7 +40,9 @@ TEXTS_TOLD = 3
 
 @dataclass(frozen=True)
 class Episode:
-    """`first` is the cause, `others` what else went wrong, `spells` the health meanwhile."""
+    """An episode: `first` is the cause, `others` are its consequences, `spells` the health
+    meanwhile.
+    """
 
     first: Finding
     others: tuple[Finding, ...]
@@ -53,14 +55,14 @@ class Episode:
 
     @property
     def to_ns(self) -> int:
-        """When its last finding ends, and health is good again."""
+        """Returns when its last finding ends and health is good again."""
         ends = [f.to_ns for f in (self.first, *self.others)] + [s.to_ns for s in self.spells]
         return max(ends)
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """Of a whole log."""
+    """What was found in a whole log."""
 
     origin_ns: int
     end_ns: int
@@ -68,24 +70,24 @@ class Explanation:
     setup: tuple[str, ...]
     health: TimeLine
     remarks: tuple[str, ...] = ()  # what the log lacks
-    unexplained: tuple[Spell, ...] = ()  # health that was not good, and no finding says why
+    unexplained: tuple[Spell, ...] = ()  # spells of bad health that no finding explains
     messages: Sequence[Message] = field(default=(), repr=False, compare=False)
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Whether the run can be trusted, as every command says it."""
+        """Returns the verdict on the run, as in every command."""
         from pelorus.check.verdict import verdict_of_log  # noqa: PLC0415 - it takes seconds
 
         return verdict_of_log(self.messages)
 
     @property
     def diverged(self) -> int:
-        """How many of the episodes are divergences."""
+        """Returns the number of episodes that are divergences."""
         return sum(episode.first.cause is Cause.DIVERGED for episode in self.episodes)
 
     @property
     def first(self) -> Finding | None:
-        """The first cause of the first episode, else what is wrong all along."""
+        """Returns the first cause of the first episode, else what is wrong throughout."""
         if self.episodes:
             return self.episodes[0].first
         if self.setup:
@@ -93,11 +95,11 @@ class Explanation:
         return None
 
     def seconds(self, t_ns: int) -> float:
-        """Since the first frame."""
+        """Returns the time since the first frame, s."""
         return (t_ns - self.origin_ns) / S
 
     def lines(self) -> list[str]:
-        """At most twenty, without the verdict."""
+        """Returns at most twenty lines, without the verdict."""
         out = list(self._head())
         out += [f"log: {words}" for words in self.remarks]
         out += [f"setup: {words}" for words in self.setup]
@@ -112,7 +114,9 @@ class Explanation:
         return out[:LINES]
 
     def _most_telling(self) -> list[tuple[int, Episode]]:
-        """With their numbers, in the order of time: divergences before all others."""
+        """Returns the most important episodes with their numbers, in time order; divergences
+        first.
+        """
         numbered = list(enumerate(self.episodes, 1))
         worst = sorted(numbered, key=lambda one: one[1].first.cause is not Cause.DIVERGED)
         return sorted(worst[:EPISODES_TOLD], key=lambda one: one[0])
@@ -141,7 +145,9 @@ class Explanation:
         return [f"{number}. {span}: {head}", *(f"   {words}" for words in lines)][: max(room, 2)]
 
     def told_of(self, episode: Episode) -> list[str]:
-        """The first cause, what was seen before, what to do, and what followed in its order."""
+        """Returns an episode's lines: first cause, what was seen before, what to do, and
+        consequences.
+        """
         first = episode.first
         then = [(f.from_ns, self._follows(f, first)) for f in episode.others]
         then += [(s.from_ns, s.words(self.origin_ns)) for s in episode.spells]
@@ -158,12 +164,14 @@ class Explanation:
         return f"{self.seconds(one.from_ns):.2f} s{why}: {one.cause}: {one.words}"
 
     def _lasting(self, found: Finding) -> str:
-        """For how long, if it lasted."""
+        """Returns how long it lasted, in words; empty if it was a moment."""
         seconds = self.seconds(found.to_ns) - self.seconds(found.from_ns)
         return f", {seconds:.1f} s long" if seconds >= LASTS_S else ""
 
     def json(self) -> dict[str, Any]:
-        """Times in seconds since the first frame, and in ns as in the log."""
+        """Returns the result as JSON, with times in seconds since the first frame, and in ns as
+        in the log.
+        """
         return {
             "happened": bool(self.episodes),
             "first_cause": None if self.first is None else self._finding(self.first),
@@ -198,10 +206,10 @@ class Explanation:
 
 
 def explain(messages: Sequence[Message]) -> Explanation:
-    """Of the messages of a log; PelorusError where no filter answered."""
+    """Explains a log; raises PelorusError where no filter answered."""
     log = log_of(messages)
     health = time_line(messages)
-    assert health is not None  # log_of has refused a log without answers
+    assert health is not None  # log_of refuses a log without answers
     inputs = [*of_stamps(log), *of_inputs(log)]
     odd = (*of_small(log, messages), *(_behind(one, inputs) for one in contradictions(log)))
     found = sorted((*inputs, *odd), key=_order)
@@ -210,7 +218,7 @@ def explain(messages: Sequence[Message]) -> Explanation:
     setup = tuple(of_setup(log, calm))
     if gated_share(log, calm) <= GATED_MOST:
         found += [one for one in rejected(log) if not _near(one, found)]
-    if not setup:  # a filter whose sigmas are wrong is lost now and then, and nothing happened
+    if not setup:  # with wrong sigmas a filter is lost now and then without an event
         found += list(_unexplained(log, health, found))
     groups = [*_grouped(sorted(found, key=_order)), *_grouped(list(divergences(log)))]
     groups.sort(key=lambda group: _order(group[0]))
@@ -241,7 +249,7 @@ def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
 
 
 def divergences(log: Log) -> Iterator[Finding]:
-    """Frames after which a variance was not positive: arithmetic that failed, whatever came in."""
+    """Yields frames after which a variance was not positive: the arithmetic failed."""
     for first, last in runs(log.said(NOT_POSITIVE)):
         count = last - first + 1
         words = f"a variance ceased to be positive in {count} frame{'s' * (count > 1)}; the filter "
@@ -250,7 +258,7 @@ def divergences(log: Log) -> Iterator[Finding]:
 
 
 def _behind(found: Finding, inputs: Sequence[Finding]) -> Finding:
-    """What the filter noticed when an input failed came of that, whatever looked odd before."""
+    """Returns the finding; if the filter noticed it when an input failed, it begins there."""
     if found.noticed_ns is None:
         return found
     near = [f for f in inputs if abs(f.from_ns - found.noticed_ns) <= TOGETHER_NS]
@@ -263,14 +271,14 @@ def _order(found: Finding) -> tuple[int, int]:
 
 
 def _calm(log: Log, begin_ns: int | None) -> Flags:
-    """Frames before the first event; all of them where there are too few, or no event."""
+    """Returns the frames before the first event; all where they are few or there is no event."""
     if begin_ns is None:
         return np.ones(len(log.t_ns), bool)
     return np.asarray(log.t_ns < begin_ns)
 
 
 def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterator[Finding]:
-    """Where the filter was lost and nothing that is found tells why."""
+    """Yields spells where the filter was lost and no finding explains it."""
     for spell in health.spells:
         if spell.health < LOST or _near(spell, (*found, *divergences(log))):
             continue
@@ -316,7 +324,7 @@ def _episode(log: Log, group: Sequence[Finding], health: TimeLine) -> Episode:
 
 
 def _before(log: Log, t_ns: int) -> str:
-    """The last second before it, in figures."""
+    """Returns figures of the last second before it."""
     rows = (log.arrived_ns < t_ns) & (log.arrived_ns >= t_ns - BEFORE_NS)
     if not rows.any():
         return "it began with it"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong with readings, pictures and tracks themselves. Nothing of it needs the filter's
-opinion but whether the body moved.
+"""Finds faults of readings, pictures and tracks themselves.
+
+They do not depend on the filter's opinion, except on whether the body moved.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ AXES = "xyz"
 
 
 def of_inputs(log: Log) -> Iterator[Finding]:
-    """All of it."""
+    """Yields all findings on the inputs."""
     yield from stuck(log)
     yield from shocks(log)
     yield from frozen(log)
@@ -32,14 +33,14 @@ def of_inputs(log: Log) -> Iterator[Finding]:
 # --- readings -------------------------------------------------------------------------------------
 
 STUCK_S, STUCK_READINGS = 0.5, 5
-BY_CHANCE = 1e-6  # expected number of such stretches in the drive, if readings repeat by chance
+BY_CHANCE = 1e-6  # expected number of such stretches in the drive if readings repeat by chance
 
 
 def stuck(log: Log) -> Iterator[Finding]:
-    """An axis that else changes from reading to reading reads the very same number for long.
+    """Yields axes that repeat one number for long, and otherwise change from reading to reading.
 
-    Zeros are what wheels at rest read: they are told where the pictures contradict them, and of a
-    turn rate where the body goes on.
+    Wheels at rest read zero: that is reported where the pictures contradict it, and for a turn rate
+    where the body moves on.
     """
     blocks = (
         (Cause.DEAD_ACCELEROMETER, "accelerometer", 0)
@@ -65,7 +66,7 @@ def stuck(log: Log) -> Iterator[Finding]:
 
 
 def _repeats(log: Log, axis: int) -> Iterator[tuple[int, int]]:
-    """First and last reading of each long stretch of one number, which chance does not make."""
+    """Yields first and last reading of each stretch of one number that is too long for chance."""
     same = np.diff(log.readings[:, axis]) == 0
     for first, last in runs(same):
         length = last - first + 1
@@ -87,13 +88,13 @@ def _contradicted(log: Log, begin: int, end: int) -> bool:
     return bool((log.said(CONTRADICTED) & meanwhile).any())
 
 
-FAR = 10.0  # times what 19 of 20 readings differ from their neighbourhood's median
-NEIGHBOURHOOD_S = 2.0  # shorter than a slip, longer than a hit
+FAR = 10.0  # factor of the deviation that 19 of 20 readings stay within
+NEIGHBOURHOOD_S = 2.0  # shorter than a slip, longer than an impact
 HIT_MOST_S = 1.0
 
 
 def shocks(log: Log) -> Iterator[Finding]:
-    """Readings far from the median of their neighbourhood, for less than a second."""
+    """Yields readings far from the median of their neighbourhood, for less than a second."""
     if len(log.readings) < 2 * STUCK_READINGS:
         return
     window = max(round(NEIGHBOURHOOD_S * S / max(period(log.reading_ns), 1.0)), STUCK_READINGS)
@@ -108,8 +109,9 @@ def shocks(log: Log) -> Iterator[Finding]:
 
 
 def _suffered(log: Log, begin: int, end: int) -> bool:
-    """Whether a reading was refused, or a frame found odd, meanwhile or soon after: else the filter
-    took it in its stride.
+    """Returns whether a reading was refused or a frame suspect, then or soon after.
+
+    Otherwise the filter coped with it.
     """
     refused = any(begin <= report.t_ns <= end for report in log.refused)
     meanwhile = (log.t_ns >= begin) & (log.t_ns <= end + S)
@@ -130,7 +132,7 @@ def _hit(log: Log, times: Floats, first: int, last: int) -> str:
 
 
 def _joined(flags: Flags, t_ns: Times) -> list[tuple[int, int]]:
-    """Stretches of yes, those within half a second as one."""
+    """Returns the stretches of True, joined across gaps of half a second."""
     out: list[tuple[int, int]] = []
     for first, last in runs(flags):
         if out and t_ns[first] - t_ns[out[-1][1]] <= S // 2:
@@ -144,7 +146,7 @@ def _joined(flags: Flags, t_ns: Times) -> list[tuple[int, int]]:
 
 
 def frozen(log: Log) -> Iterator[Finding]:
-    """The same pixels again, and the filter knows that the body moved."""
+    """Yields stretches of identical pixels in which the filter knows that the body moved."""
     same = (log.shared >= FEW) & (2 * log.repeated >= log.shared)
     told = log.said(FROZEN_IMAGE)
     for first, last in runs(same):
@@ -155,13 +157,15 @@ def frozen(log: Log) -> Iterator[Finding]:
             yield Finding(Cause.FROZEN_PICTURE, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-BEFORE = 10  # frames that tell how many points are usually followed
-HABIT_S = 10.0  # what happens more often than that is no event, it is how the front end works
+BEFORE = 10  # frames that show how many points are usually followed
+HABIT_S = 10.0  # what happens more often is no event, but how the front end works
 TRACKED = 2 * FEW  # points that a frame mostly shares with the one before, where tracks can be lost
 
 
 def losses(log: Log) -> list[tuple[int, int]]:
-    """Frames in a row that share too few points with the ones before, where it was otherwise."""
+    """Returns stretches of frames that share too few points with the ones before, unlike the
+    usual.
+    """
     few = log.shared < FEW
     few[0] = False
     out = []
@@ -173,13 +177,13 @@ def losses(log: Log) -> list[tuple[int, int]]:
 
 
 def is_habit(log: Log, lost: list[tuple[int, int]], length: int) -> bool:
-    """Whether losses of at least this length come more often than every ten seconds."""
+    """Returns whether losses of at least this length come more often than every ten seconds."""
     whole_s = float(log.t_ns.max() - log.t_ns.min()) / S
     return sum(last - first >= length for first, last in lost) > max(whole_s / HABIT_S, 2.0)
 
 
 def lost_tracks(log: Log) -> Iterator[Finding]:
-    """No point is followed from a frame to the next: darkness, blur, a tracker that began anew."""
+    """Yields frames to which no point was followed: darkness, blur, a tracker that restarted."""
     lost = losses(log)
     for first, last in lost:
         if is_habit(log, lost, last - first):
@@ -192,11 +196,11 @@ def lost_tracks(log: Log) -> Iterator[Finding]:
         yield Finding(Cause.LOST_TRACKS, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-REJECTED_FRAMES = 2  # one is no event
+REJECTED_FRAMES = 2  # frames: a single one is no event
 
 
 def rejected(log: Log) -> Iterator[Finding]:
-    """The gate rejects most of what is seen, for some frames."""
+    """Yields stretches of frames in which the gate rejects most observations."""
     matched, gated = log.column("matched"), log.column("gated")
     most = (matched >= PAIRS_MIN) & (2 * gated > matched)
     for first, last in runs(most):

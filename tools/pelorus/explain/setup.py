@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong all along: settings that do not fit, a front end that loses its tracks.
+"""Finds what is wrong throughout: settings that do not fit, a front end that loses its tracks.
 
-It is no event: nothing happened. But a filter whose sigmas are wrong rejects, doubts and locks, and
-who reads its log must know that first.
+It is no event. But a filter whose sigmas are wrong rejects, doubts and locks, and the reader of its
+log must know that first.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
     for name in ("NOISE_MISFIT", "BIAS_OFF_PRIOR", "TWIST_CONTRADICTED", "NO_TWISTS")
 )
 LATE = number("status", "LATE")
-GATED_MOST = 0.2  # of the matches: as sigmas say, the gate rejects one of a hundred
-FRAMES_LEAST = 20  # to say so of
+GATED_MOST = 0.2  # of the matches: with right sigmas the gate rejects one of a hundred
+FRAMES_LEAST = 20  # for such a remark
 ALL_ALONG = 0.5  # of the frames
-DOMINATES = 2.0  # of two parts of a vector one is most of it
-PERIODS_LATE = 2.0  # behind a frame; within one its newest reading lies as it comes
+DOMINATES = 2.0  # ratio from which one part of a vector is most of it
+PERIODS_LATE = 2.0  # behind a frame; its newest reading is normally within one
 DIRECTIONS = ("forward", "sideways", "upward", "roll", "pitch", "yaw")
 
 
 def of_setup(log: Log, calm: Flags) -> Iterator[str]:
-    """In words; `calm` are the frames to judge by: those before the first event."""
+    """Yields remarks; `calm` are the frames to judge by: those before the first event."""
     if np.count_nonzero(calm) < FRAMES_LEAST:
         return
     if np.mean(log.column("status")[calm] != 0) > ALL_ALONG:
@@ -47,7 +47,7 @@ def of_setup(log: Log, calm: Flags) -> Iterator[str]:
 
 
 def refusals(log: Log) -> str:
-    """Of frames; empty where there are none."""
+    """Returns a remark on refused frames; empty where there are none."""
     status = log.column("status")
     refused = status != 0
     if not refused.any():
@@ -86,7 +86,9 @@ def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
 
 
 def _bias(log: Log, calm: Flags) -> str:
-    """Of wheels: a wrong scale makes one along the way, a camera that is turned one across it."""
+    """Returns a remark on wheels' bias: a wrong scale is along the way, a turned camera across
+    it.
+    """
     poses = [pose for pose, good in zip(log.poses, calm, strict=True) if good and pose is not None]
     v, b = np.zeros(3), np.zeros(6)
     if poses and len(log.readings) and not log.by_imu and log.bias_sigma.all():
@@ -116,7 +118,7 @@ def _bias(log: Log, calm: Flags) -> str:
 
 
 def _readings(log: Log, calm: Flags) -> str:
-    """Missing, refused, or behind the frames."""
+    """Returns a remark on readings that are missing, refused, or behind the frames."""
     name = "IMU readings" if log.by_imu else "twists"
     behind = log.behind_ns[calm & (log.behind_ns != NO_READING)]
     if not len(behind):
@@ -132,7 +134,7 @@ def _readings(log: Log, calm: Flags) -> str:
 
 
 def gated_share(log: Log, calm: Flags) -> float:
-    """Of all matches."""
+    """Returns the share of all matches that the gate rejected."""
     matched, gated = (int(log.column(name)[calm].sum()) for name in ("matched", "gated"))
     return gated / matched if matched else 0.0
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Readings of small sensors that contradict what the filter knows: wheels that slip beside an IMU,
-a position that is off.
-"""
+"""Finds readings of small sensors that contradict the filter: slipping wheels, a wrong position."""
 
 from __future__ import annotations
 
@@ -16,12 +14,12 @@ from pelorus.schema import SENSORS, number
 from pelorus.small_sensors import name_of
 
 REJECTED = number("reason", "READINGS_REJECTED")
-FRAMES_LEAST = 2  # one is no event
+FRAMES_LEAST = 2  # frames: a single one is no event
 
 
 def of_small(log: Log, messages: Sequence[Message]) -> Iterator[Finding]:
-    """Frames in a row before which readings were rejected; which sensors there were, and how far
-    off wheels read.
+    """Yields stretches of frames with rejected readings, with their sensors and how far off
+    wheels read.
     """
     readings = [m for m in messages if isinstance(m, Reading)]
     for first, last in runs(log.said(REJECTED)):
@@ -35,7 +33,7 @@ def of_small(log: Log, messages: Sequence[Message]) -> Iterator[Finding]:
 
 
 def _rolled(log: Log, readings: Sequence[Reading]) -> str:
-    """What wheels say of the speed ahead, and what the filter does."""
+    """Returns the forward speed by wheels and by the filter, in words."""
     ahead = [m for m in readings if m.sensor == SENSORS["wheel"] and m.axes & 1]
     poses = [pose for pose in log.poses if pose is not None]
     if not ahead or not poses:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong with the clocks: steps, and pauses of a sensor.
+"""Finds faults of the clocks: steps, and pauses of a sensor.
 
-After a gap the pictures tell which of the two it was: while the camera does not see, the body moves
-on, and if the picture has moved no more than it does from frame to frame, no time has passed.
+After a gap the pictures tell them apart: while the camera does not see, the body moves on. If the
+picture has moved no more than from frame to frame, no time has passed.
 """
 
 from __future__ import annotations
@@ -16,23 +16,24 @@ from pelorus.explain.log import NO_READING, Log, period
 from pelorus.layout import Floats
 from pelorus.motion import Times
 
-BEFORE, AFTER = 10, 5  # frames whose median tells how stamps stood, and stand
+BEFORE, AFTER = 10, 5  # frames whose median gives the lead before and after
 MAD = 1.4826  # of a normal distribution: sigma over the median absolute deviation
-JITTER_SIGMAS = 8.0  # by which a stamp's lead does not change by chance
+JITTER_SIGMAS = 8.0  # no chance changes a stamp's lead by more
 
 
 def of_stamps(log: Log) -> Iterator[Finding]:
-    """All of it."""
+    """Yields all findings on the clocks."""
     yield from clock_steps(log)
     yield from gaps(log)
     yield from backwards(log)
 
 
 def clock_steps(log: Log) -> Iterator[Finding]:
-    """Frames come between readings as before, and their stamps have moved against the readings'.
+    """Yields steps of the frames' stamps against the readings', while they still arrive between
+    these.
 
-    By how much a frame's stamp is ahead of the newest reading varies by a period of the readings,
-    and by what is usual on this log. A step is more, and lasts.
+    The lead of a frame's stamp over the newest reading varies by a period of the readings, and by
+    the log's usual jitter. A step is larger, and lasts.
     """
     known = np.nonzero(log.behind_ns != NO_READING)[0]
     if len(known) < BEFORE:
@@ -45,7 +46,7 @@ def clock_steps(log: Log) -> Iterator[Finding]:
     for k in np.nonzero(np.abs(np.diff(ahead)) > least)[0] + 1:
         before, after = ahead[max(k - BEFORE, 0) : k], ahead[k : k + AFTER]
         if behind[k : k + AFTER][-1] == behind[-1]:
-            continue  # the readings have ended: no frame tells their stamps any more
+            continue  # the readings have ended
         by = float(np.median(after) - np.median(before))
         if abs(by) <= least or np.ptp(before) > abs(by) / 2 or np.ptp(after) > abs(by) / 2:
             continue
@@ -60,22 +61,22 @@ def clock_steps(log: Log) -> Iterator[Finding]:
 
 
 def _jitter(ahead: Floats) -> float:
-    """Sigma of the lead from frame to frame; a single step does not show in it."""
+    """Returns the sigma of the lead from frame to frame; a single step does not affect it."""
     change = np.diff(ahead)
     return MAD * float(np.median(np.abs(change - np.median(change))))
 
 
-PAUSE_S = 1.0  # after so long without a frame the filter says so
-PERIODS = 10  # that fail: one or two are lost on any bus
-SAME_FLOW = 3.0  # times the picture's way from frame to frame: far less than ten periods make of it
-MOVES_PX = 1.0  # a picture that moves less tells no time
+PAUSE_S = 1.0  # without a frame, after which the filter reports it
+PERIODS = 10  # missing ones: one or two are lost on any bus
+SAME_FLOW = 3.0  # ratio to the picture's motion between frames; ten periods make far more
+MOVES_PX = 1.0  # a smaller motion of the picture shows no time
 
 
 def gaps(log: Log) -> Iterator[Finding]:
-    """No frame, or no reading, for long."""
+    """Yields long gaps without a frame, or without a reading."""
     name = "IMU reading" if log.by_imu else "twist"
     for begin, end, _ in _long(log.reading_ns):
-        if _between(log.t_ns, begin, end):  # where neither came it is told of the frames
+        if _between(log.t_ns, begin, end):  # a gap of both is reported as one of the frames
             words = f"no {name} for {(end - begin) / S:.1f} s"
             yield Finding(Cause.NO_READINGS, begin, end, words)
     for begin, end, k in _long(log.t_ns):
@@ -91,7 +92,7 @@ def gaps(log: Log) -> Iterator[Finding]:
 
 
 def _long(t_ns: Times) -> Iterator[tuple[int, int, int]]:
-    """Begin and end of each gap, and the number of what came before it."""
+    """Yields begin and end of each gap, and the number of what came before it."""
     step = np.diff(t_ns)
     for k in np.nonzero(step > max(PAUSE_S * S, PERIODS * period(t_ns)))[0]:
         yield int(t_ns[k]), int(t_ns[k + 1]), int(k)
@@ -113,7 +114,7 @@ def _no_time_passed(log: Log, k: int) -> bool:
 
 
 def backwards(log: Log) -> Iterator[Finding]:
-    """Stamps that go back. Of frames against readings it is told as a step."""
+    """Yields stamps that go back. A step of frames against readings is reported by clock_steps."""
     name = "IMU readings" if log.by_imu else "twists"
     streams = [(log.reading_ns, name)]
     if (log.behind_ns == NO_READING).all():

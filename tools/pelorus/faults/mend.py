@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All examinations in the order in which they build on each other."""
+"""All examinations, in the order in which they build on each other."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"
 CANNOT = "what is off by less than four times as much cannot be seen in this drive"
 BEHIND = "before that is mended this drive cannot tell scale, clock and the camera's place"
-SCALE_TOLD = 0.02  # sigma of the scale, above which a drive says little of it
+SCALE_TOLD = 0.02  # sigma of the scale above which a drive shows little of it
 
 
 def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """Find and mend what the recording's own data give away.
+    """Finds and mends what the recording's own data show to be wrong.
 
-    Tracks come first, for the others measure with them; axes before the lever, which takes the
-    way of the camera from the twists.
+    Tracks come first, for the others measure with them; axes come before the lever, which uses the
+    body's displacement by the twists.
     """
     findings = []
     for examine in (stale.mend, axes.mend, lever.mend):
@@ -40,14 +40,15 @@ def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
 def held_to_fit(
     given: Recording, mended: Recording, findings: Sequence[Finding]
 ) -> tuple[Recording, list[Finding]]:
-    """The absolute test. An extrinsic that was changed stays so only if all fits with it; and what
-    is wrong besides is told by name.
+    """Returns the mended recording if all fits with it, else the given one; names the other faults.
+
+    A changed extrinsic is kept only so.
     """
     found = judged(mended)
     if mended.tracks is not given.tracks and any(
         fault.name == NOTHING_LASTS for fault in found.faults
     ):
-        # pictures that stand still, not single tracks
+        # frozen pictures, not single stale tracks
         mended = replace(mended, tracks=given.tracks)
         findings = [_taken_back(finding, found.faults[0], stale.SUBJECT) for finding in findings]
         found = judged(mended)
@@ -62,7 +63,9 @@ def held_to_fit(
 
 
 def _known(found: Judged) -> Iterator[Finding]:
-    """How well the drive tells what it was asked, so that silence is not taken for a promise."""
+    """Yields how well the drive shows what was examined, so that silence is not taken for a
+    promise.
+    """
     if found.agreed is not None:
         told = found.agreed.scale_sigma < SCALE_TOLD
         yield Finding(AGREES, False, known_words(found.agreed), CANNOT, told=told)
@@ -71,7 +74,7 @@ def _known(found: Judged) -> Iterator[Finding]:
 
 
 def known_words(agreed: Agreement) -> str:
-    """What the drive tells of camera and body, and how well."""
+    """Returns in words what the drive shows of camera and body, and how well."""
     place_m = np.sqrt(np.diagonal(agreed.lever_covariance))
     place = f"to {place_m.max():.2f} m"
     if place_m.max() > PLACE_TOLD_M:

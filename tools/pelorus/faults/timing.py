@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Twist timing: does the reading of frame k hold behind it or before it?
+"""Detects the twists' timing: does the reading of frame k hold after it or before it?
 
-Shown by: points of frame k carried to frame k + 1 with either reading. `mid` does not compete: a
-mean of two noisy readings has less noise and would win for that alone.
+Points of frame k are carried to frame k + 1 with either reading. `mid` does not compete: a mean of
+two noisy readings has less noise and would win for that alone.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Z_MIN = 3.0
 
 
 def choose(recording: Recording) -> tuple[Recording, Finding]:
-    """START unless END explains clearly more frames."""
+    """Returns the recording with START, unless END explains clearly more frames."""
     camera = recording.header.camera
     seen = seen_pairs(recording.tracks, camera, 1)
     choices = [

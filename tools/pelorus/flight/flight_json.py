@@ -14,7 +14,7 @@ from pelorus.frames import Config
 
 
 def of(log: Log, judgements: Sequence[Judgement]) -> dict[str, Any]:
-    """All that `compare` tells; a part is a life of the robot."""
+    """Returns all that `compare` reports; a part is one life of the robot."""
     return {
         "log": str(log.path),
         "verdict": verdict_of(judgements).name.lower(),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the page says of a log before any curve: the settings in force, the calibration as given and
-as estimated, and what the recording says of itself.
+"""Tables for the page: settings in force, calibration given and estimated, and the recording's
+own.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ SEVERITIES = ("", "warning", "error")
 
 
 def tables_of(messages: Sequence[Message]) -> list[Table]:
-    """Folded: they are for who looks for them."""
+    """Returns the tables, folded, for readers who look for them."""
     return [*_settings(messages), *_calibration(messages), *_remarks(messages)]
 
 
 def _settings(messages: Sequence[Message]) -> Iterator[Table]:
-    """Those that differ from the defaults first."""
+    """Yields the settings; those that differ from the defaults first."""
     configs = [m for m in messages if isinstance(m, Config) and m.build_fingerprint]
     if not configs:
         return

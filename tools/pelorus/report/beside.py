@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the page says in tables of one log, or of two side by side: settings that differ, figures,
-drift by length.
-"""
+"""Tables of one log, or of two side by side: settings that differ, figures, drift by length."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ DRIFT = (
 
 
 class Told(NamedTuple):
-    """A log by its name."""
+    """A log with its name."""
 
     name: str
     found: Explanation
@@ -34,7 +32,7 @@ class Told(NamedTuple):
 
 
 def drift_table(logs: Sequence[Told]) -> list[Table]:
-    """None where no log has a truth."""
+    """Returns a table of drift by length; none where no log has a truth."""
     by_log = {
         log.name: {drift.length_m: drift for drift in drifts(log.accuracy)}
         for log in logs
@@ -60,7 +58,7 @@ def _cells(drift: Drift | None) -> list[str]:
 
 
 def side_by_side(first: Told, second: Told) -> list[Table]:
-    """Figures of both, and the settings in which they differ."""
+    """Returns tables of both logs' figures, and of the settings in which they differ."""
     head = ("", first.name, BESIDE)
     mine, theirs = dict(_figures(first)), dict(_figures(second))
     tables = [Table("Side by side", [head, *((key, x, theirs[key]) for key, x in mine.items())])]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Drawings of a log beside its curves: how the IMU vibrates, and what is left of the pixels."""
+"""Draws the spectrum of the IMU's vibration, and the pixel residuals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ROBUST = 1.4826
 
 
 def drawings(log: Log) -> Iterator[Drawing]:
-    """All that this log has."""
+    """Yields all drawings for which this log has data."""
     if log.by_imu:
         yield from _spectra(log)
     found = residuals(log)

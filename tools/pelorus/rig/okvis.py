@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The configuration of OKVIS and OKVIS 2: a list of cameras, and an IMU's noise.
+"""Reads the configuration of OKVIS and OKVIS 2: a list of cameras, and an IMU's noise.
 
-T_SC brings points of the camera to the IMU; a picture was taken its delay before its stamp.
+T_SC maps points of the camera to the IMU; a picture was taken its delay before its stamp.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DELAYS = ("imageDelay", "image_delay")
 
 
 def is_config(content: Named) -> bool:
-    """By its list of cameras."""
+    """Returns whether it has OKVIS' list of cameras."""
     cameras = content.content.get("cameras")
     return isinstance(cameras, list) and any(
         isinstance(one, dict) and "T_SC" in one for one in cameras
@@ -43,7 +43,7 @@ def is_config(content: Named) -> bool:
 
 
 def read(content: Named, asked: Sequence[str] = ()) -> Rig:
-    """Of two cameras: those asked for by number, else the two that are a pair."""
+    """Reads two cameras: those asked for by number, else the stereo pair."""
     cameras = [
         Named(content.path, one, f"cameras[{k}]") for k, one in enumerate(content.get("cameras"))
     ]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""OpenCV's stereo calibration: K1 D1 K2 D2 R T, in one file or in two (intrinsics, extrinsics).
+"""Reads OpenCV's stereo calibration: K1 D1 K2 D2 R T, in one file or in two.
 
-R and T (or t) bring points of the first camera to the second one (stereoCalibrate).
+R and T (or t) map points of the first camera to the second one (stereoCalibrate).
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 
-# How the matrix of camera {} is called, and its lens; and what {} may be for the two.
+# Names of the matrix of camera {} and of its lens; and what {} may be for the two.
 MATRICES = ("K{}", "M{}", "CM{}", "cameraMatrix{}", "CameraMatrix{}", "camera_matrix{}")
 DISTORTIONS = ("D{}", "distCoeffs{}", "DistCoeffs{}", "dist_coeffs{}", "distortion{}")
 SIDES = (("1", "2"), ("_1", "_2"), ("L", "R"), ("_left", "_right"), ("Left", "Right"))
 LENSES = (LensModel.NONE, LensModel.RADTAN, LensModel.EQUIDISTANT)
 SHIFTS = ("T", "t")
 SIZES = ("imageSize", "image_size")
-FISHEYE_OR_NOT = 4  # so many coefficients both have
+FISHEYE_OR_NOT = 4  # number of coefficients that both models may have
 
 
 def is_opencv(content: Named) -> bool:
-    """Of a stereo calibration the cameras, or where they stand."""
+    """Returns whether it has the cameras of a stereo calibration, or their relative pose."""
     has_one = any(pattern.format(side[0]) in content for pattern in MATRICES for side in SIDES)
     return has_one or ("R" in content and any(name in content for name in SHIFTS))
 
 
 def stereo(content: Named, model: LensModel | None) -> Rig:
-    """`model` is asked for where the number of coefficients does not tell."""
+    """Reads the pair; `model` is needed where the number of coefficients leaves it open."""
     T_21 = Poses(
         se3.nearest_rotation(arrays.rotation(content.path, "R", matrix(content, "R", 3, 3))),
         _column(content, next((name for name in SHIFTS if name in content), SHIFTS[0])),
@@ -114,7 +114,7 @@ def _one_of(content: Named, patterns: tuple[str, ...], number: int) -> str:
 
 
 def xml_words(path: Path, words: str) -> dict[str, Any]:
-    """What cv::FileStorage writes as XML: the same names and matrices as in its YAML."""
+    """Reads what cv::FileStorage writes as XML: the same names and matrices as in its YAML."""
     try:
         root = ET.fromstring(words)
     except ET.ParseError as error:

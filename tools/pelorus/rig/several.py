@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Which two of a rig's cameras are the stereo pair.
+"""Chooses the stereo pair among a rig's cameras.
 
-A pair is made of two like cameras that look the same way: of equal lens and resolution, with their
-axes within 30 degrees. A colour camera between two infrared ones is none of the pair, wherever the
+A pair has two similar cameras that look the same way: of equal lens and resolution, with their axes
+within 30 degrees. So a colour camera between two infrared ones is not in the pair, wherever the
 file lists it.
 """
 
@@ -21,14 +21,14 @@ from pelorus.rig.lens import Lens
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 
-SAME_FOCAL = 0.05  # of it: two cameras of one kind differ by less
+SAME_FOCAL = 0.05  # relative difference of two cameras of one kind
 APART_MAX_RAD = radians(30.0)
 
 
 class Camera(NamedTuple):
-    """A camera of several; `T` brings points of a frame that all share to it."""
+    """A camera of several; `T` maps points of a common frame to it."""
 
-    names: tuple[str, ...]  # what the file calls it: cam0, its topic
+    names: tuple[str, ...]  # in the file: cam0, its topic
     lens: Lens
     T: Poses
 
@@ -38,7 +38,7 @@ class Camera(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """Positions of the two in the list, and what is to be said of the choice."""
+    """The two cameras' positions in the list, and remarks on the choice."""
 
     first: int
     second: int

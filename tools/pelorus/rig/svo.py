@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""SVO's and maplab's camera rigs: a list `cameras`, each with a `camera` and a T_B_C.
+"""Reads SVO's and maplab's camera rigs: a list `cameras`, each with a `camera` and a T_B_C.
 
-T_B_C brings points of the camera to the body, which is the IMU.
+T_B_C maps points of the camera to the body, which is the IMU.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ON_BODY = "T_B_C"
 
 
 def is_rig(content: Named) -> bool:
-    """By a list of cameras that say where they stand."""
+    """Returns whether it has a list of cameras with poses."""
     cameras = content.content.get("cameras")
     return isinstance(cameras, list) and any(
         isinstance(one, dict) and "camera" in one and ON_BODY in one for one in cameras
@@ -43,7 +43,7 @@ def is_rig(content: Named) -> bool:
 
 
 def read(content: Named, asked: Sequence[str] = ()) -> Rig:
-    """Of two cameras: those asked for by label or number, else the two that are a pair."""
+    """Reads two cameras: those asked for by label or number, else the stereo pair."""
     listed = content.get("cameras")
     if len(listed) < 2 or not all(isinstance(one, dict) for one in listed):
         raise ForeignFileError(content.path, f"has {len(listed)} camera", due="two are expected")
@@ -53,7 +53,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
 
 
 def _imu(content: Named) -> ImuModel:
-    """Its densities, where SVO's file has some that are not 0."""
+    """Returns the IMU's densities, where SVO's file has nonzero ones."""
     if "imu_params" not in content:
         return ImuModel()
     imu = content.object("imu_params")
