@@ -42,7 +42,7 @@ LANGUAGES = {"h": "c", "c": "c", "py": "python"}
 
 def trajectory_sum(recording: Path, words: tuple[str, ...], folder: Path) -> str:
     """SHA-256 of the trajectory that the desk finds."""
-    path = folder / "path.tum"
+    path = folder / f"{recording.stem}.tum"
     command = [str(cross.NATIVE), str(recording), *words, "--quiet", "--trajectory", str(path)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -159,7 +159,7 @@ def plr_03(of_03: Converted, once: Once) -> Path:
 @pytest.fixture
 def pelorus(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
     def run(*arguments: object, status: int | None = 0) -> Said:
-        """`status` is due; None: any."""
+        """`status` is expected; None: any."""
         capsys.readouterr()
         got = main([str(argument) for argument in arguments])
         captured = capsys.readouterr()

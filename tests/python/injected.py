@@ -287,7 +287,7 @@ def found_in(recording: Recording) -> list[Fault]:
 
 
 def injections(recording: Recording) -> Iterator[tuple[str, int, Recording, tuple[str, ...]]]:
-    """Fault, strength, the recording that has it, what is due."""
+    """Fault, strength, the recording that has it, what is expected."""
     by_imu = len(recording.inertial.t_ns) > 0
     for name, (change, due) in (OF_IMU if by_imu else OF_RECORDINGS).items():
         for k in range(1 if name in ALIKE else 3):

@@ -116,7 +116,8 @@ def test_the_bits_are_the_librarys_though_the_compiler_may_contract(two_files: P
     found = []
     for program in (BIN / "pelorus-replay", two_files / "replay"):
         path = two_files / "path.tum"
-        command = [str(program), str(drive), "--slots", "30", "--quiet", "--trajectory", str(path)]
+        command = [str(program), str(drive), "--slots", "30", "--quiet", "--force"]
+        command += ["--trajectory", str(path)]
         subprocess.run(command, check=True, capture_output=True)
         found.append(path.read_bytes())
     assert len(found[0].splitlines()) > 80

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from draws import draws
 from drives import at_rest, clean, with_stale_tracks
 from imu_drives import NOISY, noisy, options
 from numpy.typing import NDArray
@@ -62,7 +63,7 @@ def test_cameras_that_run_free_are_told_by_how_much(by_ms: float) -> None:
     assert "Trigger both cameras together" in found.fault.words
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", draws(range(4)))
 def test_cameras_that_are_triggered_together_are_not_accused(seed: int) -> None:
     for drive in (noisy(seed).recording, clean(seed=seed)):
         found = sync.apart(drive)

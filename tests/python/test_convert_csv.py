@@ -187,7 +187,7 @@ BAD_CSV = [
     (edited("camera.json", '"pixel_sigma_px": 0.5', '"pixel_sigma_px": NaN'), "names with numbers"),
     (edited("camera.json", '"twist_timing": "end"', '"twist_timing": ["end"]'), "start or end"),
     (edited("camera.json", '"name": ', '"fx_px": 1, "name": '), "'fx_px' twice"),
-    (edited("camera.json", '"name": "mine"', '"name": ["mine"]'), "words are due"),
+    (edited("camera.json", '"name": "mine"', '"name": ["mine"]'), "words are expected"),
     (edited("camera.json", '"name": "mine"', r'"name": "\ud800"'), "half of a surrogate pair"),
 ]
 

@@ -122,11 +122,11 @@ def test_a_grid_that_nobody_named_and_places_that_are_none_are_told(tmp_path: Pa
 
     utm = ["0,500000,5300000,400", "1,500001,5300000,400"]
     head = "t_s,easting_m,northing_m,alt_m"
-    assert "in which grid?; --crs EPSG:326NN is due" in said(head, utm)
+    assert "in which grid?; --crs EPSG:326NN is expected" in said(head, utm)
     assert "--crs EPSG:99: is not known" in said(head, utm, "EPSG:99")
     assert "has easting_m and northing_m, and --crs is EPSG:4258" in said(head, utm, "EPSG:4258")
     far = ["0,47,8,400", "1,0.0,0.0,400"]
-    assert "km from the first one; at most 100 km are due: is there a row without" in said(
+    assert "km from the first one; at most 100 km are expected: is there a row without" in said(
         "t_s,lat_deg,lon_deg,alt_m", far
     )
     assert "is no place in WGS 84" in said(
@@ -168,7 +168,7 @@ def test_fixes_of_a_bag_become_positions_of_the_antenna(tmp_path: Path, pelorus:
     bag = written(recorder, tmp_path / "plain", "mcap")
     words = (*on_body(tmp_path, drive), "--position-topic", "/fix")
     said = pelorus("convert", "ros", bag, target, *words, status=1).err
-    assert "/fix: messages tell no covariance; --position-sigma M is due" in said
+    assert "/fix: messages tell no covariance; --position-sigma M is expected" in said
     pelorus("convert", "ros", bag, target, *words, "--position-sigma", "2.5")
 
 

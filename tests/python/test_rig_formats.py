@@ -406,12 +406,16 @@ def changed(paths: list[Path], old: str, new: str) -> list[Path]:
 
 def test_what_lacks_of_a_pair_is_said(tmp_path: Path) -> None:
     c, d = Cameras(), tmp_path
-    assert "num_of_cam: 2 is due" in said(changed(vins(c, d), "num_of_cam: 2", "num_of_cam: 1"))
+    assert "num_of_cam: 2 is expected" in said(
+        changed(vins(c, d), "num_of_cam: 2", "num_of_cam: 1")
+    )
     vins(c, d)
-    assert "VINS-Fusion's configuration (body_T_cam0, cam0_calib) is due" in said([d / "left.yaml"])
+    assert "VINS-Fusion's configuration (body_T_cam0, cam0_calib) is expected" in said(
+        [d / "left.yaml"]
+    )
     (d / "right.yaml").unlink()
     assert "right.yaml: cannot be read" in said([d / "config.yaml"])
-    assert "1 files of cameras; 2 of camera_info of ROS are due" in said(camera_info(c, d)[:1])
+    assert "1 files of cameras; 2 of camera_info of ROS are expected" in said(camera_info(c, d)[:1])
     assert "neither camera has a baseline" in said([camera_info(c, d)[0]] * 2)
     assert "model_type is 'SCARAMUZZA'" in said(
         [vins(c, d)[0], *changed([d / "left.yaml"], "PINHOLE", "SCARAMUZZA"), d / "right.yaml"]
@@ -419,7 +423,7 @@ def test_what_lacks_of_a_pair_is_said(tmp_path: Path) -> None:
     assert "is of one camera" in said(changed(orb3(c, d), "Stereo.T_c1_c2", "Other"))
     both = changed(rectified(RECTIFIED, d, True), "Camera.k1: 0", "Camera.k1: -0.3")
     assert "has a baseline alone, and a distortion (Camera.k1)" in said(both)
-    assert "files of one are due" in said([*orb3(c, d), *camera_info(c, d)])
+    assert "files of one are expected" in said([*orb3(c, d), *camera_info(c, d)])
     assert "is no XML" in said(changed(opencv_xml(c, d), "</opencv_storage>", ""))
     assert "is XML of html" in said([_written(d / "x.xml", "<html></html>")])
     assert "lacks rx" in said(changed(zed(c, d), "RX_2K", "RX_4K"))

@@ -222,10 +222,10 @@ def test_two_sensors_of_a_kind_are_two_files(tmp_path: Path, pelorus: Run) -> No
 
 
 BAD = [
-    ("wheel.csv", "vx_mps", "v", "measures nothing; some of vx_mps, vy_mps, vz_mps are due"),
+    ("wheel.csv", "vx_mps", "v", "measures nothing; some of vx_mps, vy_mps, vz_mps are expected"),
     ("wheel.csv", "sigma_mps", "s", "lacks the column sigma_mps"),
     ("wheel.csv", "0.1,2,0.1", "0.1,2,0", "row 3: sigma_mps is 0, a positive number"),
-    ("wheel.csv", "0.1,2,0.1", "0.1,fast,0.1", "row 3: vx_mps is 'fast', a number is due"),
+    ("wheel.csv", "0.1,2,0.1", "0.1,fast,0.1", "row 3: vx_mps is 'fast', a number is expected"),
     ("wheel.csv", "0.1,2,0.1", "0.1,nan,0.1", "vx_mps is not finite"),
     ("wheel.csv", "0.1,2,0.1", "0.1,1e12,0.1", "row 3: vx_mps is 1e+12, at most 1e+09"),
     ("wheel.csv", "at_y_m", "at_m", "lacks the column at_y_m"),

@@ -339,5 +339,5 @@ def test_a_log_that_is_cut_or_bare_is_shown_as_far_as_it_goes(
     silent = tmp_path / "silent.plr"
     write_file(silent, [m for m in kept if not isinstance(m, Report)], len(kept))
     words = pelorus("explain", silent, status=1).err
-    assert words == f"error: {silent}: holds no REPORT of a frame: a whole log is due\n"
+    assert words == f"error: {silent}: holds no REPORT of a frame: a whole log is expected\n"
     assert not any(name.startswith("/curves/doubt") for name in read_rrd(tmp_path / "bare.rrd"))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from bags import Recorder
 from converted import Run, messages_of
+from draws import draws
 from pelorus import se3
 from pelorus.converters import wheels
 from pelorus.converters.wheels import STANDSTILL, WHEEL, Rolling
@@ -68,7 +69,7 @@ def test_a_body_that_cannot_slide_is_measured_along_all_axes() -> None:
 DARK = Span(10.0, 60.0)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", draws([1, 2]))
 def test_a_minute_in_the_dark_costs_a_percent_of_the_way_if_the_body_cannot_slide(
     seed: int, tmp_path: Path
 ) -> None:
@@ -151,7 +152,7 @@ def test_a_bags_wheels_go_beside_its_imu_along_their_own_axes(
 ) -> None:
     words = [*given, tmp_path / "out.plr"]
     outcome = pelorus(*words, "--wheel-topic", "/odom", status=1)
-    assert "/odom: messages tell no covariance; --wheel-sigma M/S is due" in outcome.err
+    assert "/odom: messages tell no covariance; --wheel-sigma M/S is expected" in outcome.err
     said = pelorus(*words, "--wheel-topic", "/odom", "--wheel-sigma", 0.05).out
     assert "/odom: the wheels sit as /tf_static says" in " ".join(said.split())
     assert "the wheels stand: " in said

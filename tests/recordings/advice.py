@@ -8,7 +8,7 @@ Real recordings are those of judge.py, with their settings. Simulated drives (ev
 of the defects below, and are told noises that are 0.3 to 3 times the true ones, each by itself.
 
 ATE      m; of 03 the RMS distance to the road
-NEES/6   mean; 1 is due
+NEES/6   mean; 1 is expected
 """
 
 from __future__ import annotations

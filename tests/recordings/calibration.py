@@ -10,7 +10,7 @@ medians. `known` is the true calibration, taken for exact: all others are compar
 `--calibrate off` nothing is estimated, and the same sigmas are taken into account.
 
 err0     m, as `pelorus evaluate` has it; ratio: beside `known`
-NEES/6   mean; 1 is due
+NEES/6   mean; 1 is expected
 good     share of the frames GOOD
 focal, baseline, turn, clock: what is left of each error, %, %, deg, ms
 sigmas   the largest of all estimated errors in its own sigmas

@@ -8,7 +8,7 @@ Points are laid into what the left camera sees, 5 to 7 m away, until it sees 250
 again has its id again. The calibration is exact. The first 120 s; RMS and means over seeds: each
 has its own cloud and pixels, and all have one IMU.
 
-err0     m; ATE: m; NEES/6: 1 is due; as `pelorus evaluate` has them
+err0     m; ATE: m; NEES/6: 1 is expected; as `pelorus evaluate` has them
 sigma    what the filter tells of the pose, RMS over the drive: rotation, degrees; position, m
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Arrays out of .npz and .mat files, with errors that say what is there and what is due."""
+"""Arrays out of .npz and .mat files, with errors that say what is there and what is expected."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Arrays:
         if shape is not None and not _fits(array.shape, shape):
             due = " x ".join("n" if size is None else str(size) for size in shape)
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", due=f"{due} is due"
+                self.path, f"{key} has the shape {array.shape}", due=f"{due} is expected"
             )
         if not np.isfinite(array).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -79,7 +79,9 @@ class Arrays:
         array = self._arrays[self.one_of(key)]
         if array.size != 1 or array.dtype.kind not in "US":
             raise ForeignFileError(
-                self.path, f"{key} is {array.size} of type {array.dtype}", due="one text is due"
+                self.path,
+                f"{key} is {array.size} of type {array.dtype}",
+                due="one text is expected",
             )
         item = array.reshape(()).item()
         return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
@@ -88,7 +90,7 @@ class Arrays:
         array = self.get(key)
         if array.size != 1:
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", due="one number is due"
+                self.path, f"{key} has the shape {array.shape}", due="one number is expected"
             )
         return float(array.reshape(()))
 
@@ -125,7 +127,8 @@ def require_baseline(path: Path, length_m: float) -> None:
         raise ForeignFileError(
             path,
             f"the cameras stand {length_m:g} apart",
-            due=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are due: are these millimetres, or "
+            due=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are expected: are these "
+            "millimetres, or "
             "squares of the board? Divide so that it is in metres",
         )
 
@@ -161,7 +164,7 @@ def check_seconds(path: Path, what: str, numbers: Floats, unit_ns: float = 1e9) 
         raise ForeignFileError(
             path,
             f"{what} spans {numbers.min():g} to {numbers.max():g}",
-            due=f"{name} from 0 to {most:g} are due{guess if numbers.min() >= 0 else ''}",
+            due=f"{name} from 0 to {most:g} are expected{guess if numbers.min() >= 0 else ''}",
         )
 
 

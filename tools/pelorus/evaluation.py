@@ -6,7 +6,7 @@ With T^ the estimate, T the truth, both at frames of equal time, and A = T^_0 T_
 err0_m        RMS of |p^_k - p(A T_k)|
 ate_m         RMS of |p^_k - p(A' T_k)| with the best rigid A', no scale
 rot_deg       RMS angle of R^_k^T R(A T_k)
-nees_per_dof  mean of e^T P^-1 e / 6, e = Log(T^_k^-1 A T_k), the first frame left out: 1 is due
+nees_per_dof  mean of e^T P^-1 e / 6, e = Log(T^_k^-1 A T_k), the first frame left out: expected 1
 map_*         of e = m^ - A m over the landmarks of equal id; NEES e^T P^-1 e / 3
 
 With an IMU gravity shows the vertical, so A turns about it alone, and is taken at the frame at
@@ -44,7 +44,7 @@ MEANING = {
     "ate_sim3_m": "RMS position error after the best fit of place, turn and scale",
     "scale": "by which the estimate is to be multiplied for that",
     "rot_deg": "RMS rotation error, first poses aligned",
-    "nees_per_dof": "mean NEES of the pose, a degree of freedom: 1 is due",
+    "nees_per_dof": "mean NEES of the pose, a degree of freedom: 1 is expected",
     **inertial_evaluation.MEANING,
     "truth_frames": "poses compared",
     "nees_left_out": "of them with a covariance that has no inverse, left out of NEES",
@@ -52,7 +52,7 @@ MEANING = {
     "map_landmarks": "landmarks compared",
     "map_rms_m": "RMS distance of the landmarks from where they are known to be",
     "map_median_m": "median of that distance",
-    "map_nees_per_dof": "mean NEES of a landmark, an axis: 1 is due",
+    "map_nees_per_dof": "mean NEES of a landmark, an axis: 1 is expected",
     "map_nees_left_out": "landmarks with a covariance that has no inverse, left out of that",
     "map_sigma_least_m": "what the map claims of its best landmark, an axis",
     "map_sigma_largest_m": "and of its worst",

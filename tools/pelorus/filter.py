@@ -428,7 +428,9 @@ class Filter:
     def restore(self, saved: bytes) -> None:
         """Goes on from a saved state of the same calibration, settings and build."""
         if not isinstance(saved, bytes | bytearray):
-            raise PelorusError(f"saved: {type(saved).__name__}; the bytes that save gave are due")
+            raise PelorusError(
+                f"saved: {type(saved).__name__}; the bytes that save gave are expected"
+            )
 
         def give(_context: object, offset: int, data: int, n: int) -> int:
             c.memmove(data, saved[offset : offset + n], n)

@@ -49,7 +49,7 @@ ArraysByName = dict[str, NDArray[np.generic]]
 class ForeignFileError(PelorusError):
     """A file is not what it should be: which one, where in it, what is wrong, what would be right.
 
-    `due` is a sentence of its own: "12 numbers are due".
+    `due` is a sentence of its own: "12 numbers are expected".
     """
 
     def __init__(self, path: Path, wrong: str, *, at: str = "", due: str = "") -> None:
@@ -69,7 +69,9 @@ def content(path: Path, most: int) -> bytes:
             while piece := stream.read(PIECE_BYTES):
                 size += len(piece)
                 if size > most:
-                    raise ForeignFileError(path, "is too long", due=f"at most {most} bytes are due")
+                    raise ForeignFileError(
+                        path, "is too long", due=f"at most {most} bytes are expected"
+                    )
                 pieces.append(piece)
     except OSError as error:
         raise ForeignFileError(path, f"cannot be read: {error.strerror}") from error
@@ -105,7 +107,9 @@ def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
     except UnicodeDecodeError as error:
         bad = error.start
     if bad >= 0:  # a zero, too: UTF-16 without a mark, or what was never written
-        raise ForeignFileError(path, "is no text", at=f"byte {bad}", due="text in UTF-8 is due")
+        raise ForeignFileError(
+            path, "is no text", at=f"byte {bad}", due="text in UTF-8 is expected"
+        )
     return found
 
 
@@ -173,7 +177,7 @@ def sound(
     due = columns or Counter(len(row.cells) for row in given).most_common(1)[0][0]
     short = np.array([len(row.cells) for row in given]) != due
     first = given[int(short.argmax())]
-    what = f"has {len(first.cells)} numbers; {due} a row are due"
+    what = f"has {len(first.cells)} numbers; {due} a row are expected"
     remarks = left_out(path, short, lambda k: f"line {given[k].line}", what)
     whole = _where(given, ~short)
     found = _numbers(path, whole, due)
@@ -215,7 +219,7 @@ def _numbers(path: Path, given: list[Row], columns: int | None) -> Floats:
         at = f"line {line}"
         if len(cells) != due:
             raise ForeignFileError(
-                path, f"has {len(cells)} numbers", at=at, due=f"{due} a row are due"
+                path, f"has {len(cells)} numbers", at=at, due=f"{due} a row are expected"
             )
         if not all(map(is_number, cells)):
             raise ForeignFileError(path, "holds something that is no number", at=at)
@@ -251,7 +255,7 @@ def csv_rows(path: Path) -> Csv:
         table.insert(0, comments[-1])
         skipped -= 1
     if not table:
-        raise ForeignFileError(path, "the file is empty", due="a row of column names is due")
+        raise ForeignFileError(path, "the file is empty", due="a row of column names is expected")
     names, below = table[0], table[1:]
     by_semicolons = len(names) == 1 and ";" in names[0]
     _, more = _comments(below)
@@ -262,7 +266,9 @@ def csv_rows(path: Path) -> Csv:
                 path,
                 f"has {len(row)} cells, the first row names {len(names)}",
                 at=f"row {number}",
-                due="points in numbers, and commas between them, are due" if by_semicolons else "",
+                due="points in numbers, and commas between them, are expected"
+                if by_semicolons
+                else "",
             )
     return Csv(names, below[more:], first_row)
 
@@ -307,13 +313,15 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
         json.dumps(found, ensure_ascii=False).encode("utf-8")
     except RecursionError:
         raise ForeignFileError(
-            path, "is nested too deep", due="an object with numbers, words and lists of them is due"
+            path,
+            "is nested too deep",
+            due="an object with numbers, words and lists of them is expected",
         ) from None
     except UnicodeEncodeError:
         raise ForeignFileError(
             path,
             "holds half of a surrogate pair (\\ud800 to \\udfff)",
-            due="whole characters are due",
+            due="whole characters are expected",
         ) from None
     except json.JSONDecodeError as error:
         raise ForeignFileError(
@@ -322,14 +330,16 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
     except ValueError as error:
         raise ForeignFileError(path, str(error)) from None
     if not isinstance(found, dict):
-        raise ForeignFileError(path, "is JSON without names", due="an object with names is due")
+        raise ForeignFileError(
+            path, "is JSON without names", due="an object with names is expected"
+        )
     return found
 
 
 def _integer(digits: str) -> int:
     if len(digits.lstrip("-")) > INTEGER_DIGITS_MAX:
         raise ValueError(
-            f"holds a number of {len(digits)} digits; at most {INTEGER_DIGITS_MAX} are due"
+            f"holds a number of {len(digits)} digits; at most {INTEGER_DIGITS_MAX} are expected"
         )
     return int(digits)
 
@@ -376,7 +386,9 @@ def yaml_object(path: Path) -> dict[str, Any]:
 def yaml_words(path: Path, words: str) -> dict[str, Any]:
     """The same from words that stand in the file."""
     if len(words) > YAML_BYTES_MAX:
-        raise ForeignFileError(path, "is too long", due=f"at most {YAML_BYTES_MAX} bytes are due")
+        raise ForeignFileError(
+            path, "is too long", due=f"at most {YAML_BYTES_MAX} bytes are expected"
+        )
     _require_shallow(path, words)
     yaml = YAML(typ="safe", pure=True)
     yaml.Constructor = _Constructor
@@ -391,7 +403,7 @@ def yaml_words(path: Path, words: str) -> dict[str, Any]:
     except (YAMLError, RecursionError, ValueError) as error:
         raise ForeignFileError(path, f"is no YAML: {_first_line(error)}") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
-        raise ForeignFileError(path, "is YAML without names", due="names with values are due")
+        raise ForeignFileError(path, "is YAML without names", due="names with values are expected")
     return found
 
 
@@ -407,7 +419,9 @@ def _require_shallow(path: Path, words: str) -> None:
     deepest = max(accumulate((c in "[{") - (c in "]}") for c in words), default=0)
     if deepest > YAML_DEPTH_MAX:
         raise ForeignFileError(
-            path, "is nested too deep", due="names with numbers, words and lists of them are due"
+            path,
+            "is nested too deep",
+            due="names with numbers, words and lists of them are expected",
         )
 
 
@@ -417,7 +431,7 @@ def _require_shallow(path: Path, words: str) -> None:
 def npz(path: Path) -> ArraysByName:
     """All arrays of a .npz file; pickled objects are refused."""
     _require_file(path)
-    due = "a .npz file (a zip of numpy arrays, as np.savez makes one) is due"
+    due = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
     if beginning(path).startswith(NPY_MAGIC):
         raise ForeignFileError(path, "is a lone array (.npy)", due=due)
     if not zipfile.is_zipfile(path):
@@ -438,7 +452,7 @@ def _require_unpackable(path: Path) -> None:
     locked = [member.filename for member in members if member.flag_bits & 1]
     if locked:
         raise ForeignFileError(
-            path, "is encrypted", at=locked[0], due="a zip without a password is due"
+            path, "is encrypted", at=locked[0], due="a zip without a password is expected"
         )
     _require_size(path, sum(member.file_size for member in members))
 
@@ -459,7 +473,7 @@ def mat(path: Path) -> ArraysByName:
 
 def _require_file(path: Path) -> None:
     if path.is_dir():
-        raise ForeignFileError(path, "is a folder", due="one file of it is due")
+        raise ForeignFileError(path, "is a folder", due="one file of it is expected")
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
     size = path.stat().st_size
@@ -473,7 +487,7 @@ def _require_size(path: Path, size: int) -> None:
         raise ForeignFileError(
             path,
             f"holds {size} bytes of arrays",
-            due=f"at most {ARRAYS_BYTES_MAX} are due: cut the drive into pieces",
+            due=f"at most {ARRAYS_BYTES_MAX} are expected: cut the drive into pieces",
         )
 
 

@@ -228,7 +228,7 @@ class Imu(Message, kind=Kind.IMU):
         if np.shape(self.a_B_mps2) != (count, 3) or np.shape(self.w_B_radps) != (count, 3):
             raise ValueError(
                 f"readings of shapes {np.shape(self.a_B_mps2)} and {np.shape(self.w_B_radps)} "
-                f"where ({count}, 3) is due"
+                f"where ({count}, 3) is expected"
             )
         with np.errstate(over="ignore", invalid="ignore"):  # beyond float32: infinite
             rows = np.hstack([self.a_B_mps2, self.w_B_radps]).astype("<f4")

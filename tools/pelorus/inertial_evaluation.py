@@ -2,7 +2,7 @@
 """What a filter with an IMU knew of its states, one by one, where TRUTH says them.
 
 Each NEES is a mean over frames and degrees of freedom, of e^T P^-1 e with the state's own block of
-P; of the biases, whose variances alone stand in a POSE, of e^2 / variance: 1 is due for all.
+P; of the biases, whose variances alone stand in a POSE, of e^2 / variance: 1 is expected for all.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
 
 MEANING = {
-    "nees_position": "mean NEES of the position, a degree of freedom: 1 is due",
+    "nees_position": "mean NEES of the position, a degree of freedom: 1 is expected",
     "nees_rotation": "of the rotation",
     "nees_velocity": "of the velocity",
     "nees_bias_accel": "of the accelerometer's bias",

@@ -28,7 +28,7 @@ class MalformedPayload(ValueError):
 def need(payload: bytes, size: int) -> None:
     """Refuse a payload shorter than `size` bytes."""
     if len(payload) < size:
-        raise MalformedPayload(f"payload of {len(payload)} bytes, at least {size} are due")
+        raise MalformedPayload(f"payload of {len(payload)} bytes, at least {size} are expected")
 
 
 def within(name: str, value: int, least: int, most: int) -> int:
@@ -72,7 +72,7 @@ class _Run:
                 array = np.asarray(value, np.float64)
                 if array.shape != shape:
                     raise ValueError(
-                        f"{field.name} is an array of shape {array.shape} where {shape} is due"
+                        f"{field.name} is an array of shape {array.shape} where {shape} is expected"
                     )
                 yield from array.ravel().tolist()
             else:

@@ -107,7 +107,7 @@ def _unpacked(packed: bytes, most: int) -> bytes:
         raise BrokenMatFile(f"a packed array is damaged: {error}") from None
     if not stream.eof:
         raise BrokenMatFile(
-            f"a packed array is cut off, or has more than {most} bytes, which are due at most"
+            f"a packed array is cut off, or has more than {most} bytes, which are expected at most"
         )
     return whole
 

@@ -133,7 +133,7 @@ def _readings(R: Floats) -> Iterator[tuple[str, Floats]]:
     ):
         rolled = Rotation.from_quat(np.roll(q, by, axis=1)).as_matrix()
         yield words, rolled
-    yield "are the rotations of {} world to body? Body to world is due.", np.swapaxes(R, 1, 2)
+    yield "are the rotations of {} world to body? Body to world is expected.", np.swapaxes(R, 1, 2)
 
 
 def _steps(R: Floats) -> Floats:
@@ -171,5 +171,5 @@ def _inverse(a: Named, b: Named, as_read: Fit) -> list[str]:
     return [
         f"positions fit to {as_read.plain_m:.2g} m, those of the inverse transforms to "
         f"{found.plain_m:.2g} m: "
-        f"are the poses of {b.name} world to body? Body to world is due"
+        f"are the poses of {b.name} world to body? Body to world is expected"
     ]

@@ -43,7 +43,7 @@ class Named:
         array = as_numbers(value)
         if array is None or array.shape != shape or not sane(array):
             size = " x ".join(map(str, shape))
-            due = f"{size} finite numbers are due" if shape else "a finite number is due"
+            due = f"{size} finite numbers are expected" if shape else "a finite number is expected"
             raise self.error(name, value, due)
         return array
 
@@ -54,14 +54,14 @@ class Named:
         """One of the choices."""
         value = self.get(name)
         if not isinstance(value, str) or value not in choices:
-            raise self.error(name, value, f"{' or '.join(choices)} is due")
+            raise self.error(name, value, f"{' or '.join(choices)} is expected")
         return value
 
     def object(self, name: str) -> Named:
         """What stands under a name, which has names itself."""
         value = self.get(name)
         if not isinstance(value, dict):
-            raise self.error(name, value, "names with values are due")
+            raise self.error(name, value, "names with values are expected")
         return Named(self.path, value, f"{self.at}.{name}" if self.at else name)
 
     def size(self, name: str) -> tuple[int, int]:
@@ -69,9 +69,9 @@ class Named:
         value = self.get(name)
         sizes = as_numbers(value)
         if sizes is None or sizes.shape != (2,) or not sane(sizes):
-            raise self.error(name, value, "[width, height] in px is due")
+            raise self.error(name, value, "[width, height] in px is expected")
         if not ((sizes % 1 == 0) & (sizes > 0)).all():
-            raise self.error(name, value, "[width, height] in px is due")
+            raise self.error(name, value, "[width, height] in px is expected")
         return int(sizes[0]), int(sizes[1])
 
 

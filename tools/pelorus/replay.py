@@ -17,7 +17,7 @@ from pelorus import native, packed_file
 from pelorus.console import err, waiting
 from pelorus.errors import PelorusError, write_text, writing
 from pelorus.frames import Kind, Message, Pose, Report
-from pelorus.wire import Writer, counted_messages_of, messages_of
+from pelorus.wire import Writer, counted_messages_of, messages_of, stuffed_of
 
 SETTINGS_MAX_DEPTH = "max-depth"
 
@@ -75,6 +75,18 @@ def replay(
     return summary, [line for line in stderr.splitlines() if line.strip()]
 
 
+class NothingUsefulError(PelorusError):
+    """Nothing useful could be done with the recording (the program's exit status 1)."""
+
+
+def stuffed_answers(program: Path, recording: Path, options: Sequence[str]) -> list[bytes]:
+    """Returns the frames of what the filter answers to a recording, still to be read."""
+    with tempfile.TemporaryDirectory(prefix="pelorus-", dir=recording.parent) as folder:
+        answers = Path(folder) / "answers.plr"
+        run_program(program, recording, ["--quiet", *options, "--out", str(answers)])
+        return stuffed_of(answers)
+
+
 def replayed(program: Path, inputs: Iterable[Message], options: Sequence[str]) -> list[Message]:
     """What the filter answers to these messages, with them."""
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
@@ -118,7 +130,7 @@ def whole_log_of(source: Path, options: Sequence[str], programs: Path | None) ->
     """A result that says what became of its frames, too."""
     messages = result_of(source, options, programs)
     if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
-        raise PelorusError(f"{source}: holds no REPORT of a frame: a whole log is due")
+        raise PelorusError(f"{source}: holds no REPORT of a frame: a whole log is expected")
     return messages
 
 
@@ -133,7 +145,10 @@ def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> flo
 
 
 def run_program(program: Path, recording: Path, options: Sequence[str]) -> tuple[str, str]:
-    """What it printed on both streams. PelorusError, with its words, where it did not end well."""
+    """Returns what it printed on both streams.
+
+    Raises PelorusError, with its words, where it did not end well.
+    """
     name, unpacked = packed_file.for_program(recording)
     command = [str(program), name, *options]
     try:
@@ -145,5 +160,6 @@ def run_program(program: Path, recording: Path, options: Sequence[str]) -> tuple
     if done.returncode != 0:
         how = f"status {done.returncode}" if done.returncode > 0 else f"signal {-done.returncode}"
         said = stderr.replace(f"{program.name}: ", "").strip() or "it said nothing"
-        raise PelorusError(f"{recording}: {program.name} ended with {how}:\n{said}")
+        error = NothingUsefulError if done.returncode == 1 else PelorusError
+        raise error(f"{recording}: {program.name} ended with {how}:\n{said}")
     return stdout, stderr

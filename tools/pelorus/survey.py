@@ -233,7 +233,7 @@ def _imu_remarks(imu: ImuSurvey) -> list[str]:
     if imu.still is not None and abs(imu.still.force_mps2 - GRAVITY_MPS2) > GRAVITY_OFF_MPS2:
         said.append(
             f"IMU: at rest it feels {imu.still.force_mps2:.3g} m/s^2, where gravity's "
-            f"{GRAVITY_MPS2:g} are due"
+            f"{GRAVITY_MPS2:g} are expected"
         )
     return said
 

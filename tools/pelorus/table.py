@@ -179,7 +179,7 @@ class Table:
                 raise ForeignFileError(
                     self.path,
                     f"{self._called(name)} is {_shown(cell.strip())}, "
-                    f"a whole number from 0 to {highest} is due",
+                    f"a whole number from 0 to {highest} is expected",
                     at=self.row(row),
                 )
             out[row] = int(text)
@@ -278,7 +278,7 @@ class Table:
             row = next(k for k, cell in enumerate(cells) if not foreign.is_number(cell))
             raise ForeignFileError(
                 self.path,
-                f"{self._called(name)} is {_shown(cells[row])}, a number is due",
+                f"{self._called(name)} is {_shown(cells[row])}, a number is expected",
                 at=self.row(row),
             ) from None
         if not np.isfinite(column).all():

@@ -78,7 +78,7 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
             path,
             f"has {columns} numbers",
             at=f"line {sound.rows[0].line}",
-            due=f"{POSE_COLUMNS} are due: t x y z qx qy qz qw",
+            due=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
         )
     if in_ns is None:
         in_ns = arrays.are_ns(sound.numbers[:, 0])
@@ -123,7 +123,8 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
         raise ForeignFileError(
             path,
             f"names the columns {', '.join(names[:POSE_COLUMNS])}",
-            due="time, position and quaternion (x y z w, or w first) are due, in that order or "
+            due="time, position and quaternion (x y z w, or w first) are expected, in that "
+            "order or "
             "the quaternion before the position",
         )
     return (1, 4, order) if begin == 4 else (5, 1, order)
@@ -174,7 +175,7 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
         raise ForeignFileError(
             path,
             f"rows of {columns} numbers",
-            due=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are due",
+            due=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
         )
     return read_stamped(path)
 
@@ -243,7 +244,7 @@ def read_kitti(path: Path) -> Poses:
             path,
             f"has {len(rows[0].cells)} cells",
             at=f"line {rows[0].line}",
-            due=f"{KITTI_COLUMNS} numbers are due ([R | p])",
+            due=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
         )
     numbers = foreign.numbers(path, rows, KITTI_COLUMNS)
     matrices = numbers.reshape(-1, 3, 4)
@@ -251,7 +252,9 @@ def read_kitti(path: Path) -> Poses:
     off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
     if off.max() > 1e-2:
         at = f"line {rows[int(off.argmax())].line}"
-        raise ForeignFileError(path, "holds no rotation", at=at, due="[R | p] is due, row by row")
+        raise ForeignFileError(
+            path, "holds no rotation", at=at, due="[R | p] is expected, row by row"
+        )
     return Poses(se3.nearest_rotation(R), matrices[:, :, 3])
 
 

@@ -160,7 +160,7 @@ class Reader:
         if body is None:
             self._damaged(offset, "not valid COBS")
         elif len(body) < BODY_BYTES_MIN:
-            self._damaged(offset, f"{len(body)} bytes, at least {BODY_BYTES_MIN} are due")
+            self._damaged(offset, f"{len(body)} bytes, at least {BODY_BYTES_MIN} are expected")
         elif zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
             self._damaged(offset, "the CRC does not fit")
         else:

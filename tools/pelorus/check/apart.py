@@ -9,7 +9,7 @@ where the noise is what the settings say, the difference of an estimate from hal
 best one from all of it has the covariance P_half - P_all, whatever noise (of the twists) both share
 (Hausman, Specification tests in econometrics, 1978). So the drive is cut into windows, each
 window's points into halves, left and right, upper and lower, near and far, and at random; each
-half's poses are compared with those from all points. 1 is due. Where they are farther apart,
+half's poses are compared with those from all points. 1 is expected. Where they are farther apart,
 the noises are made larger until they are not (halves_alike.py). A drive by an IMU is one window:
 each window would have to find the vertical and its speed anew.
 
@@ -34,11 +34,10 @@ from pelorus import se3, wire
 from pelorus.check.contents import AHEAD, recording_of, write
 from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
-from pelorus.errors import PelorusError
 from pelorus.evaluation import world_laid
 from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo, Twist
 from pelorus.layout import Floats
-from pelorus.replay import run_program
+from pelorus.replay import NothingUsefulError, stuffed_answers
 from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory, estimate_in
@@ -159,12 +158,11 @@ class Parts:
         )
 
     def _estimate(self, part: _Part, options: Sequence[str]) -> Estimate | None:
-        answers = part.path.with_suffix(".answers")
         try:
-            run_program(self._program, part.path, ["--quiet", *options, "--out", str(answers)])
-        except PelorusError:  # not a frame of so short a part could be used
+            answers = stuffed_answers(self._program, part.path, options)
+        except NothingUsefulError:  # not a frame of so short a part could be used
             return None
-        return estimate_in(list(wire.only(wire.stuffed_of(answers), Kind.POSE)))
+        return estimate_in(list(wire.only(answers, Kind.POSE)))
 
 
 def _typical(values: Sequence[float]) -> float:

@@ -50,7 +50,7 @@ def with_halves_alike(bench: Bench, tuned: Tuned) -> Tuned:
 
 def inflate(parts: Parts, of: Callable[[float], Settings]) -> Inflated:
     """`of`: settings with noises so many times as large. 1 where chance may have moved the halves,
-    or where the factor that is due does not bring them together.
+    or where the factor that is expected does not bring them together.
     """
     before = parts.apart(of(1.0))
     stays = Inflated(1.0, before, before)

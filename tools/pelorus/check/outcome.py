@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 import os
-import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -37,7 +36,7 @@ from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
 from pelorus.frames import Header, Kind, Message, Pose, Process, Report, Stereo
 from pelorus.layout import Floats, unpack_symmetric
-from pelorus.replay import run_program
+from pelorus.replay import stuffed_answers
 from pelorus.schema import number
 from pelorus.trajectory import POSE_SIZE
 
@@ -62,7 +61,7 @@ class Outcome:
     used: int
     gated: int
     frames: int
-    nis: float  # a degree of freedom: 1 is due
+    nis: float  # a degree of freedom: 1 is expected
     bias: Floats  # at the end, (b_v, b_w)
     bias_variance: Floats
     contradicted: float = 0.0  # of the frames: in these vision contradicts twists or IMU
@@ -149,15 +148,12 @@ class Bench:
         settings = dict(key)
         recording = self._recording(settings)
         wanted = {k: v for k, v in settings.items() if not k.startswith("@")}
-        with tempfile.TemporaryDirectory(dir=self._folder) as folder:
-            answers = Path(folder) / "answers.plr"
-            options = ["--quiet", *options_of(wanted | {"gate-d2": GATE_D2})]
-            run_program(self._program, recording, [*options, "--out", str(answers)])
-            frames = wire.stuffed_of(answers)
-            poses = wire.only(reversed(frames), Kind.POSE)
-            last = (m for m in poses if isinstance(m, Pose) and m.after_stereo)
-            told = chain(wire.only(frames, Kind.REPORT), islice(last, 1))
-            return outcome_of(told, self._outlier_cost)
+        options = options_of(wanted | {"gate-d2": GATE_D2})
+        frames = stuffed_answers(self._program, recording, options)
+        poses = wire.only(reversed(frames), Kind.POSE)
+        last = (m for m in poses if isinstance(m, Pose) and m.after_stereo)
+        told = chain(wire.only(frames, Kind.REPORT), islice(last, 1))
+        return outcome_of(told, self._outlier_cost)
 
 
 def _by_offset(settings: Settings) -> Settings:

@@ -131,7 +131,7 @@ def csv(
     stereo: Path | None = typer.Option(
         None,
         help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame. "
-        "Without it another sensor is due, such as --position.",
+        "Without it another sensor is expected, such as --position.",
     ),
     calibration: list[Path] = typer.Option(
         [],

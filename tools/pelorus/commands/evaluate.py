@@ -99,7 +99,7 @@ def evaluate(
     elif options:
         raise typer.BadParameter("for a recording", param_hint="--config / --set")
     elif truth is None and road_file is None:
-        raise typer.BadParameter("for a TUM file one is due", param_hint="--truth / --road")
+        raise typer.BadParameter("for a TUM file one is expected", param_hint="--truth / --road")
     found_poses = estimate_in(messages)
     estimate = found_poses[0] if found_poses else read_stamped(source)
     found: Figures = {}
@@ -182,7 +182,8 @@ def _require_something(
         raise PelorusError(
             f"{mine[0]}: {found['truth_frames']} of its {len(mine[1].t_ns)} poses "
             f"({_span(mine[1])}) have a pose of equal time among the {len(theirs[1].t_ns)} of "
-            f"{theirs[0]} ({_span(theirs[1])}); {POSES_MIN} are due" + (f"; {hint}" if hint else "")
+            f"{theirs[0]} ({_span(theirs[1])}); {POSES_MIN} are expected"
+            + (f"; {hint}" if hint else "")
         )
 
 

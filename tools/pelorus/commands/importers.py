@@ -280,7 +280,9 @@ def _ros(
 def _require_imu(wheel_topic: str, twist_topic: str, joint_topic: str) -> None:
     """PelorusError where another topic than an IMU's would move the body, beside wheels."""
     if wheel_topic and joint_topic:
-        raise PelorusError("--wheel-topic and --joint-topic: both are wheels, one of them is due")
+        raise PelorusError(
+            "--wheel-topic and --joint-topic: both are wheels, one of them is expected"
+        )
     if twist_topic:
         raise PelorusError(
             "--twist-topic moves the body in place of an IMU, and wheels go beside an IMU: leave "
@@ -293,7 +295,8 @@ def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> W
         return None
     if not topic or not joints or not 0 < radius_m < RADIUS_MAX_M or track_m < 0:
         raise PelorusError(
-            "wheels: --joint-topic TOPIC, --joint NAME (once or more) and --wheel-radius M are due"
+            "wheels: --joint-topic TOPIC, --joint NAME (once or more) and --wheel-radius M "
+            "are expected"
         )
     return Wheels(topic, tuple(joints), radius_m, track_m)
 

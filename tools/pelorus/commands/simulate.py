@@ -121,7 +121,7 @@ def _numbers(name: str, text: str) -> Numbers:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         due = "a number, or several parted by commas,"
-        raise PelorusError(f"{option_name(name)} is {text!r}: {due} is due") from None
+        raise PelorusError(f"{option_name(name)} is {text!r}: {due} is expected") from None
 
 
 def _parameter(

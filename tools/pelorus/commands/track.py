@@ -104,7 +104,7 @@ def _require_places(target: Path, sheet_file: Path | None) -> None:
         if path is not None and not path.parent.is_dir():
             raise PelorusError(f"{path}: cannot be written: there is no folder {path.parent}")
     if sheet_file is not None and resolved(sheet_file) == resolved(target):
-        raise PelorusError(f"{target}: is given for the tracks and for the sheet; two are due")
+        raise PelorusError(f"{target}: is given for the tracks and for the sheet; two are expected")
 
 
 def _read(pairs: list[Pair], bits: int, shown: dict[int, Gray]) -> Iterator[tuple[Gray, Gray]]:

@@ -56,7 +56,7 @@ class Bag(AbstractContextManager["Bag"]):
                 path,
                 "is a folder without metadata.yaml",
                 due="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap or a "
-                ".db3 is due (ros2 bag reindex makes a metadata.yaml)",
+                ".db3 is expected (ros2 bag reindex makes a metadata.yaml)",
             )
         self._open_files = ExitStack()
         self._reader = self._opened()
@@ -103,7 +103,7 @@ class Bag(AbstractContextManager["Bag"]):
         if self.types[topic] not in kinds or topic not in self.of_type(*kinds):
             raise PelorusError(
                 f"{self.path}: {topic} holds {self._reader.topics[topic].msgcount} messages of "
-                f"{self.types[topic]}; some of {' or '.join(kinds)} are due"
+                f"{self.types[topic]}; some of {' or '.join(kinds)} are expected"
             )
         return topic
 
@@ -179,7 +179,8 @@ class Bag(AbstractContextManager["Bag"]):
         return ForeignFileError(
             self.path,
             f"cannot be read as a bag: {words}",
-            due="a whole ROS 1 bag, ROS 2 bag or .mcap is due (rosbag reindex, ros2 bag reindex or "
+            due="a whole ROS 1 bag, ROS 2 bag or .mcap is expected (rosbag reindex, ros2 bag "
+            "reindex or "
             "mcap recover mend one that was cut short)",
         )
 

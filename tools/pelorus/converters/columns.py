@@ -193,7 +193,8 @@ def _column(words: str) -> Column:
     column, colon, unit = rest.partition(":")
     if not equals or not column or short not in NAMES:
         raise PelorusError(
-            f"--columns {words}: NAME=COLUMN is due, such as v=speed_mps,t=stamp_ms; names are "
+            f"--columns {words}: NAME=COLUMN is expected, such as v=speed_mps,t=stamp_ms; "
+            "names are "
             f"{', '.join(NAMES)}, also for one file: wheel.t=stamp_ms"
         )
     target, units = NAMES[short]
@@ -204,7 +205,8 @@ def _column(words: str) -> Column:
     if unit not in units:
         asks = f"{unit} is no unit of {short}:" if colon else f"in which unit is {column}?"
         raise PelorusError(
-            f"--columns {words}: {asks} {short}={column}:UNIT is due, with {' or '.join(units)}"
+            f"--columns {words}: {asks} {short}={column}:UNIT is expected, with "
+            f"{' or '.join(units)}"
         )
     if units is TIME_UNITS:
         return Column(words, file, f"t_{unit}", column, 1.0)

@@ -53,7 +53,7 @@ NAMES_ITS_COLUMNS = 0.5  # of the first row's cells: letters, where others have 
 
 @dataclass(frozen=True)
 class MotionFiles:
-    """Twists or an IMU, with a gyro's file beside them or without: one of them is due.
+    """Twists or an IMU, with a gyro's file beside them or without: one of them is expected.
 
     `measured` are the velocities that the twists' file has, `axes` are theirs.
     """
@@ -120,7 +120,7 @@ def _calibrated(sources: Sources) -> Calibrated:
     if sources.stereo is None:
         return rig_files.without_cameras(paths, "no camera")
     if not paths:
-        raise PelorusError(f"{sources.stereo}: of which cameras? --calibration FILE is due")
+        raise PelorusError(f"{sources.stereo}: of which cameras? --calibration FILE is expected")
     return rig_files.read(
         paths, sources.stereo.stem, sources.extrinsic, sources.lens, sources.cameras
     )
@@ -133,7 +133,7 @@ def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) 
     if not small:
         raise PelorusError(
             "no --stereo, and no other sensor: the motion alone is summed up to nothing that a "
-            "filter could better; --stereo FILE or --position FILE is due"
+            "filter could better; --stereo FILE or --position FILE is expected"
         )
     t_ns = np.array(sorted({reading.t_ns for reading in small}), np.int64)
     remarks.append(
@@ -168,7 +168,8 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
             raise ForeignFileError(
                 imu,
                 "has no rates of turn",
-                due=f"{', '.join(RATES.values())} are due, or --gyro FILE with them; there are: "
+                due=f"{', '.join(RATES.values())} are expected, or --gyro FILE with them; "
+                "there are: "
                 f"{', '.join(table.names)}",
             )
         if files.gyro is None:
@@ -182,7 +183,7 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
         turns = gyro.ascending_times(), gyro.numbers(*RATES.values())
         return Readings(imu, streams.joined(imu, files.gyro, forces, turns, columns.remarks))
     raise PelorusError(
-        f"{'--twists and --imu' if imu else 'neither --twists nor --imu'} given; one is due: "
+        f"{'--twists and --imu' if imu else 'neither --twists nor --imu'} given; one is expected: "
         "twists (wheels, odometry, a wheel speed alone) or the raw readings of an IMU"
     )
 
@@ -192,7 +193,7 @@ def measured_of(words: str) -> frozenset[str]:
     found = [word.strip() for word in words.split(",")]
     if not set(found) <= set(VELOCITIES) or not found:
         raise PelorusError(
-            f"--measured {words}: some of {', '.join(VELOCITIES)} are due, parted by commas"
+            f"--measured {words}: some of {', '.join(VELOCITIES)} are expected, parted by commas"
         )
     return frozenset(found)
 

@@ -90,7 +90,7 @@ def _calibrations(top: Path, of_imu: tuple[Path, ...]) -> tuple[Path, ...]:
     lacking = [path for path in cameras if not path.is_file()]
     if lacking:
         raise PelorusError(
-            f"{lacking[0]}: there is no such file; it or --calibration FILE is due (Kalibr's "
+            f"{lacking[0]}: there is no such file; it or --calibration FILE is expected (Kalibr's "
             "camchain YAML, OpenCV's stereo YAML)"
         )
     imu = top / IMU / "sensor.yaml"
@@ -137,7 +137,7 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
             + (_apart(of_left, of_right) if len(of_left) and len(of_right) and not lost else "")
         )
     if len(both) < images.PAIRS_MIN:
-        raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are due")
+        raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are expected")
     if alone:
         remarks.append(f"{alone} pictures have no partner and are left out")
     if (t_ns != partner_ns).any():
@@ -165,7 +165,7 @@ def _apart(left_ns: Times, right_ns: Times) -> str:
     apart_ns = np.abs(right_ns[motion.nearest(right_ns, left_ns)] - left_ns)
     return (
         f"; the nearest times are {np.median(apart_ns) * 1e-6:.3g} ms apart in the median, "
-        f"{apart_ns.max() * 1e-6:.3g} ms at most: cameras that are triggered together are due"
+        f"{apart_ns.max() * 1e-6:.3g} ms at most: cameras that are triggered together are expected"
     )
 
 
@@ -190,7 +190,7 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
                 listing,
                 f"holds {' '.join(cells)[:60]!r}",
                 at=f"line {line}",
-                due="a time in ns, a file are due",
+                due="a time in ns, a file are expected",
             )
         path = data / cells[1]
         found = there.pop(path.stem, None)  # another kind of file is the same picture
@@ -214,7 +214,7 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
 def _imu(path: Path, remarks: list[str]) -> Inertial:
     if not path.is_file():
         raise PelorusError(
-            f"{path}: there is no such file; it, or --twists FILE, or --imu FILE is due"
+            f"{path}: there is no such file; it, or --twists FILE, or --imu FILE is expected"
         )
     sound = foreign.sound(path, foreign.rows(path), IMU_COLUMNS)
     t_ns = trajectory.times_of(path, sound.rows, in_ns=True)

@@ -56,7 +56,8 @@ class Ground:
             raise ForeignFileError(
                 path,
                 f"a place lies {np.abs(found).max() * 1e-3:.4g} km from the first one",
-                due=f"at most {LOCAL_MAX_M * 1e-3:g} km are due: is there a row without a fix?",
+                due=f"at most {LOCAL_MAX_M * 1e-3:g} km are expected: is there a row without "
+                "a fix?",
             )
         remarks.append(
             f"{path}: places in {crs.name} become metres east, north and up of the first one "
@@ -74,7 +75,8 @@ class Ground:
             return CRS.from_user_input(self.crs or WGS84)
         except (CRSError, ProjError):
             raise PelorusError(
-                f"--crs {self.crs}: is not known; such as EPSG:32632 is due, zone 32 north of UTM"
+                f"--crs {self.crs}: is not known; such as EPSG:32632 is expected, zone 32 "
+                "north of UTM"
             ) from None
 
 
@@ -90,7 +92,8 @@ def localise(table: Table, ground: Ground) -> None:
         raise ForeignFileError(
             table.path,
             f"{' and '.join(GRID)}: in which grid?",
-            due="--crs EPSG:326NN is due for zone NN north of UTM on WGS 84, EPSG:327NN for south",
+            due="--crs EPSG:326NN is expected for zone NN north of UTM on WGS 84, EPSG:327NN "
+            "for south",
         )
     if by_degrees != (ground.system().is_geographic if ground.crs else True):
         raise ForeignFileError(table.path, f"has {' and '.join(names)}, and --crs is {ground.crs}")

@@ -73,7 +73,7 @@ def start_sigmas(words: str) -> StartSigmas:
     except ValueError:
         numbers = []
     if len(numbers) != len(StartSigmas._fields) or not all(0 < x < np.inf for x in numbers):
-        due = f"{len(StartSigmas._fields)} positive numbers parted by commas are due"
+        due = f"{len(StartSigmas._fields)} positive numbers parted by commas are expected"
         raise PelorusError(f"--start-sigmas is {words!r}: {due}")
     return StartSigmas(*numbers)
 
@@ -164,7 +164,10 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
     back = np.nonzero(np.diff(seconds) < 0)[0]
     if len(back):
         raise ForeignFileError(
-            path, "stereo_t goes back", at=f"row {back[0] + 1}", due="rows in order of time are due"
+            path,
+            "stereo_t goes back",
+            at=f"row {back[0] + 1}",
+            due="rows in order of time are expected",
         )
     id = file.get("stereo_id", shape=(count,))
     whole = (id == np.floor(id)) & (id >= 0) & (id < 2.0**32)
@@ -174,7 +177,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
             path,
             f"stereo_id is {id[row]:g}",
             at=f"row {row}",
-            due="a whole number below 2^32 is due",
+            due="a whole number below 2^32 is expected",
         )
     t_ns, frame = np.unique(np.round(seconds * 1e9).astype(np.int64), return_inverse=True)
     tracks = Tracks.from_rows(
@@ -220,7 +223,7 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
             path,
             f"the quaternion's norm is {norms[row]:.4f}",
             at=f"{key} row {row}",
-            due="1 is due, in the order x y z w",
+            due="1 is expected, in the order x y z w",
         )
     return np.asarray(Rotation.from_quat(quaternions).as_matrix())
 
@@ -238,7 +241,7 @@ def _start_time(path: Path, seconds: float, t_ns: Times) -> int:
             path,
             f"init is of {seconds:.6f} s, the readings of {t_ns[0] * 1e-9:.6f} to "
             f"{t_ns[-1] * 1e-9:.6f} s",
-            due="a state within them is due",
+            due="a state within them is expected",
         )
     return nearest if abs(nearest - told) <= SAME_TIME_NS else told
 
@@ -279,7 +282,7 @@ class _Calib(Named):
         )
         T_CB = se3.inverse(self._extrinsic(baseline))
         if self._number_or_0("cam_imu_time_offset_s"):
-            raise self._wrong("cam_imu_time_offset_s", "0 is due: times on one clock")
+            raise self._wrong("cam_imu_time_offset_s", "0 is expected: times on one clock")
         return Header(
             arrays.camera_of(self.path, fx, fy, cx, cy, baseline),
             T_CB.R,
@@ -315,7 +318,8 @@ class _Calib(Named):
             if off > ALIGNED_M:
                 raise self._wrong(
                     "T_imu_cam1",
-                    f"that of a rectified pair is due, baseline_m = {baseline:g} to the right of "
+                    f"that of a rectified pair is expected, baseline_m = {baseline:g} to the "
+                    "right of "
                     "T_imu_cam0",
                 )
         return left
@@ -324,12 +328,14 @@ class _Calib(Named):
         """Its size; it must point down the world's z."""
         g = self.array("gravity_world", 3)
         if not g[2] < 0 or np.abs(g[:2]).max() > GRAVITY_TILT:
-            raise self._wrong("gravity_world", "(0, 0, -9.81) or so is due: z of the world is up")
+            raise self._wrong(
+                "gravity_world", "(0, 0, -9.81) or so is expected: z of the world is up"
+            )
         return float(-g[2])
 
     def _noises(self) -> dict[str, float]:
         found = {name: self.number(key) for name, key in NOISES.items()}
         for name, sigma in found.items():
             if not sigma > 0:
-                raise self._wrong(NOISES[name], "a positive number is due")
+                raise self._wrong(NOISES[name], "a positive number is expected")
         return found

@@ -34,7 +34,7 @@ class Asked(NamedTuple):
         name, equals, value = words.partition("=")
         file, dot, column = name.strip().rpartition(".")
         if not (equals and column and value.strip()):
-            raise PelorusError(f"--rows {words}: COLUMN=VALUE is due, such as I=0, or imu.I=0")
+            raise PelorusError(f"--rows {words}: COLUMN=VALUE is expected, such as I=0, or imu.I=0")
         return cls(file if dot else "", column, value.strip())
 
 
@@ -115,6 +115,7 @@ def _require_one_sensor(table: Table, t_ns: NDArray[np.int64]) -> None:
         raise ForeignFileError(
             table.path,
             f"{each} rows have one time and differ as those of {each} sensors",
-            due="a column that tells the sensors apart is due (--rows COLUMN=VALUE takes one of "
+            due="a column that tells the sensors apart is expected (--rows COLUMN=VALUE takes "
+            "one of "
             "them), or a file for each",
         )

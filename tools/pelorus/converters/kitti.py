@@ -137,7 +137,7 @@ def _stamps(path: Path, count: int) -> Times:
     lines = [line.strip() for line in foreign.text(path).splitlines() if line.strip()]
     if len(lines) != count:
         raise ForeignFileError(
-            path, f"has {len(lines)} times", due=f"{count} are due, one for each file in data"
+            path, f"has {len(lines)} times", due=f"{count} are expected, one for each file in data"
         )
     t_ns = np.array([_stamp(path, k, line) for k, line in enumerate(lines, 1)], np.int64)
     back = np.nonzero(np.diff(t_ns) <= 0)[0]
@@ -152,7 +152,7 @@ def _stamp(path: Path, line: int, words: str) -> int:
         seconds = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
         return int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
     except ValueError:
-        due = "2011-09-30 12:40:25.069324302 or such is due"
+        due = "2011-09-30 12:40:25.069324302 or such is expected"
         raise ForeignFileError(
             path, f"{words[:40]!r} is no time", at=f"line {line}", due=due
         ) from None
@@ -176,7 +176,7 @@ def _odometry(folder: Path, asked: Asked, made: Made) -> Streams:
     if truth is None:
         raise PelorusError(
             f"{folder}: the benchmark has no twists, and there is no {_poses_file(folder)} to make "
-            "some from; --twists FILE, --imu FILE or --truth FILE is due"
+            "some from; --twists FILE, --imu FILE or --truth FILE is expected"
         )
     noise = replace(
         calibrated.header.noise,
@@ -237,7 +237,7 @@ def _cameras(folder: Path, known: Sequence[tuple[str, str]]) -> _Folder:
         raise PelorusError(f"{folder}: cannot be read as a folder: {error.strerror}") from error
     raise PelorusError(
         f"{folder}: has no {words}; a raw drive (..._sync, with oxts) or a sequence of the "
-        f"odometry benchmark is due; there are: {there}"
+        f"odometry benchmark is expected; there are: {there}"
     )
 
 
@@ -292,7 +292,7 @@ class _Calib:
             raise ForeignFileError(
                 self.path,
                 f"{name} has {numbers.size} numbers",
-                due=f"{int(np.prod(shape))} finite ones are due",
+                due=f"{int(np.prod(shape))} finite ones are expected",
             )
         return numbers.reshape(shape)
 

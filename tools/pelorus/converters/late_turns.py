@@ -22,7 +22,9 @@ def convert(source: Path, late_s: float, target: Path) -> int:
     Between two readings a rate is on the line through them; after the last one it stays.
     """
     if not 0 < abs(late_s) <= LATE_MOST_S:
-        raise PelorusError(f"--late {late_s:g}: seconds are due, up to {LATE_MOST_S:g}, and not 0")
+        raise PelorusError(
+            f"--late {late_s:g}: seconds are expected, up to {LATE_MOST_S:g}, and not 0"
+        )
     messages = wire.messages_of(source)
     twists = [m for m in messages if isinstance(m, Twist)]
     if not twists:

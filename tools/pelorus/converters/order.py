@@ -58,7 +58,7 @@ def sound(
     """Which messages have a time and finite numbers; refused where too many have not."""
     timed = ~arrays.never_set(t_ns) if t_ns.any() else np.zeros(len(t_ns), np.bool_)
     finite = np.isfinite(numbers).all(axis=1)
-    due = "times in header.stamp are due, or --stamps log: those of the messages' arrival"
+    due = "times in header.stamp are expected, or --stamps log: those of the messages' arrival"
     leave_out(bag, topic, int((~timed).sum()), len(t_ns), "headers have no time", remarks, due)
     wrong = "messages hold a number that is not finite"
     leave_out(bag, topic, int((~finite).sum()), len(t_ns), wrong, remarks)
@@ -108,7 +108,7 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
             due="was a clock set back, or are two recordings in one bag? Each must be converted "
             f"alone: --until {math.floor(until * 1e3) / 1e3:.3f} takes the first, "
             f"--from {math.ceil(later * 1e3) / 1e3:.3f} the second; if only the sensor's clock was "
-            "set, --stamps log is due",
+            "set, --stamps log is expected",
         )
     behind = np.maximum.accumulate(t_ns) - t_ns
     if behind.any():
@@ -124,7 +124,7 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
                 bag.path,
                 f"{other} of {len(t_ns)} messages have other numbers at the time of the one before",
                 at=topic,
-                due="a stamp for each reading is due, or --stamps log",
+                due="a stamp for each reading is expected, or --stamps log",
             )
     if len(times) < len(t_ns):
         remarks.append(f"{topic}: {len(t_ns) - len(times)} messages repeat a time and are left out")

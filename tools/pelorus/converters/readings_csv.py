@@ -51,7 +51,7 @@ def read(table: Table, sensor: SmallSensor) -> list[Reading]:
         if not sensor.at_rest:
             value[:, k] = _within(table, column, VALUE_MAX)
     if not measured:
-        due = f"some of {', '.join(_wanted(sensor))} are due"
+        due = f"some of {', '.join(_wanted(sensor))} are expected"
         raise ForeignFileError(path, "measures nothing", due=due)
     arm = np.zeros((len(t_ns), 3))
     if sensor.has_arm and any(table.has(name) for name in ARM):
@@ -93,7 +93,7 @@ def _sigma(table: Table, name: str) -> Floats:
     if len(bad):
         raise ForeignFileError(
             table.path,
-            f"{name} is {sigma[bad[0]]:g}, a positive number is due",
+            f"{name} is {sigma[bad[0]]:g}, a positive number is expected",
             at=table.row(int(bad[0])),
         )
     return sigma
@@ -105,7 +105,7 @@ def _within(table: Table, name: str, most: float) -> Floats:
     if len(beyond):
         raise ForeignFileError(
             table.path,
-            f"{name} is {numbers[beyond[0]]:g}, at most {most:g} is due",
+            f"{name} is {numbers[beyond[0]]:g}, at most {most:g} is expected",
             at=table.row(int(beyond[0])),
         )
     return numbers

@@ -106,7 +106,8 @@ def _of_camera_info(bag: Bag, cameras: Cameras, tree: Tree, remarks: list[str]) 
     if infos is None:
         raise PelorusError(
             f"{bag.path}: which topics of {CAMERA_INFO} are the cameras'? --left-info-topic and "
-            f"--right-info-topic are due, or --calibration FILE (docs/CONVERT.md lists which are "
+            "--right-info-topic are expected, or --calibration FILE (docs/CONVERT.md lists "
+            "which are "
             f"read); {bag.listing()}"
         )
     apart = None
@@ -143,19 +144,21 @@ def _on_body(
     frame = bare(cameras.frame) or ros_frames.camera_frame(bag, cameras.tracks or cameras.left)
     if not body:
         raise PelorusError(
-            f"{bag.path}: what moves the body does not name its frame; --body-frame NAME is due, "
+            f"{bag.path}: what moves the body does not name its frame; --body-frame NAME is "
+            "expected, "
             f"one of {tree.listing}, or --extrinsic FILE"
         )
     if not frame:
         raise PelorusError(
             f"{bag.path}: the left camera's messages do not name their frame; --camera-frame NAME "
-            f"is due, one of {tree.listing}, or --extrinsic FILE"
+            f"is expected, one of {tree.listing}, or --extrinsic FILE"
         )
     turned = [] if cameras.frame else tree.optical_of(frame)
     if turned:
         raise PelorusError(
             f"{bag.path}: the left camera's messages are of {frame!r}, which has the optical frame "
-            f"{' and '.join(turned)}: in which does the camera look along z? --camera-frame is due"
+            f"{' and '.join(turned)}: in which does the camera look along z? --camera-frame "
+            "is expected"
         )
     chain = tree.chain(body, frame)
     remarks.append(f"the left camera sits on the body as /tf_static says: {chain.words}")

@@ -108,7 +108,7 @@ def chosen(bag: Bag, cameras: Cameras, rig: Rig | None = None) -> Cameras:
     several = f"; pairs are {', '.join(map(' and '.join, pairs))}" if pairs else ""
     raise PelorusError(
         f"{bag.path}: which topics are the left and the right camera? --left-topic and "
-        f"--right-topic are due ({IMAGE}, {COMPRESSED}), or --tracks-topic{several}; "
+        f"--right-topic are expected ({IMAGE}, {COMPRESSED}), or --tracks-topic{several}; "
         f"{bag.listing()}"
     )
 
@@ -200,7 +200,8 @@ def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
         raise PelorusError(
             f"{bag.path}: of {len(left)} pictures of {cameras.left} {len(pairs)} have one of "
             f"the {len(right)} of {cameras.right} within {cameras.apart_ns * 1e-6:g} ms (median "
-            f"{apart_ms:.3g} ms); cameras that are triggered together are due, or --pair-within MS"
+            f"{apart_ms:.3g} ms); cameras that are triggered together are expected, or "
+            "--pair-within MS"
         )
     return np.stack((left[pairs[:, 0]], right[pairs[:, 1]]), axis=-1)
 
@@ -251,7 +252,9 @@ def gray(where: Path, message: Any, bits: int = 16) -> Gray:
     channels = CHANNELS.get(encoding, 1)
     if encoding not in (*PLAIN, *DEEP, *TO_GRAY):
         known = ", ".join((*PLAIN, *DEEP, *TO_GRAY))
-        raise ForeignFileError(where, f"pictures are encoded as {encoding}", due=f"{known} are due")
+        raise ForeignFileError(
+            where, f"pictures are encoded as {encoding}", due=f"{known} are expected"
+        )
     if encoding in DEEP:
         return np.asarray(_deep(where, message) >> (bits - 8), np.uint8)
     plain = _lines(where, message, channels)
@@ -324,7 +327,7 @@ def observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
         raise ForeignFileError(
             where,
             f"holds no tracks: lacks {', '.join(lacking)}",
-            due=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is due, or features of "
+            due=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is expected, or features of "
             f"{', '.join(RAYS)}; there are: {', '.join(columns) or 'none of them'}",
         )
     return np.stack([columns[name] for name in FIELDS], axis=-1)

@@ -116,7 +116,8 @@ def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists
     named = [topic for topic in (topics.twist, topics.imu) if topic]
     if len(named) + (topics.wheels is not None) > 1:
         raise PelorusError(
-            "--twist-topic, --imu-topic and --joint-topic: one of them is due, it moves the body"
+            "--twist-topic, --imu-topic and --joint-topic: one of them is expected, it moves "
+            "the body"
         )
     if topics.wheels is not None:
         return of_joints(bag, topics.wheels, remarks)
@@ -138,7 +139,7 @@ def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists
         return pair
     raise PelorusError(
         f"{bag.path}: what moves the body? {len(twists)} topics hold twists, {len(imus)} hold "
-        f"{IMU}; --twist-topic, --imu-topic or --joint-topic is due; {bag.listing()}"
+        f"{IMU}; --twist-topic, --imu-topic or --joint-topic is expected; {bag.listing()}"
     )
 
 
@@ -179,7 +180,7 @@ def of_joints(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
                 bag.path,
                 f"{topic} has the joints {', '.join(message.name)} with "
                 f"{len(message.velocity)} velocities",
-                due=f"{', '.join(wheels.joints)} with a velocity each are due",
+                due=f"{', '.join(wheels.joints)} with a velocity each are expected",
             )
         return [float(message.velocity[message.name.index(name)]) for name in wheels.joints]
 
@@ -222,7 +223,7 @@ def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
         f"all its {what} are 0",
         at=topic,
         due="are they on another topic? --imu-topic of the accelerometer and --gyro-topic of the "
-        f"gyro are due; {bag.listing()}",
+        f"gyro are expected; {bag.listing()}",
     )
 
 

@@ -50,7 +50,7 @@ def read(
             bag.path,
             "messages tell no covariance",
             at=topic,
-            due="--position-sigma M is due",
+            due="--position-sigma M is expected",
         )
     local = Ground().local(bag.path / topic.lstrip("/"), places, remarks)
     arm_m = _arm(topic, frame, body, tree, remarks)

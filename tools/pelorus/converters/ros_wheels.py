@@ -41,11 +41,11 @@ class Beside:
         """PelorusError where it makes no sense."""
         if not self.letters or set(self.letters) - set(WHEEL.letters):
             raise PelorusError(
-                f"--wheel-axes is {self.letters}: some of the letters {WHEEL.letters} are due"
+                f"--wheel-axes is {self.letters}: some of the letters {WHEEL.letters} are expected"
             )
         for option, sigma in (("sigma", self.sigma_mps), ("slide", self.slide_mps)):
             if not 0 <= sigma <= SIGMA_MAX_MPS:
-                raise PelorusError(f"--wheel-{option} is {sigma:g}: more than 0 m/s is due")
+                raise PelorusError(f"--wheel-{option} is {sigma:g}: more than 0 m/s is expected")
         if self.track_m and "x" not in self.letters:
             raise PelorusError("--track-width: left and right wheel need x in --wheel-axes")
 
@@ -97,7 +97,8 @@ def _of_topic(bag: Bag, beside: Beside, remarks: list[str]) -> tuple[Rolling, Fl
 
 def _sigma_wanted(bag: Bag, topic: str, beside: Beside) -> float:
     if not beside.sigma_mps:
-        due = "--wheel-sigma M/S is due: how far a speed is off, slip apart; 0.05 for many wheels"
+        due = "--wheel-sigma M/S is expected: how far a speed is off, slip apart; 0.05 for "
+        "many wheels"
         raise ForeignFileError(bag.path, "messages tell no covariance", at=topic, due=due)
     return beside.sigma_mps
 

@@ -249,8 +249,9 @@ def _require_gravity(readings: Readings) -> None:
         raise ForeignFileError(
             readings.where,
             f"the specific force is {usual:.3g} m/s^2 in the median",
-            due="about 9.81 is due: is it in g (--columns ax=COLUMN:g and so on), or has gravity "
-            "been taken away? Raw readings are due",
+            due="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
+            "gravity "
+            "been taken away? Raw readings are expected",
         )
 
 
@@ -385,7 +386,7 @@ def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
         raise ForeignFileError(
             rig.path,
             f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
-            due="the calibration of these pictures is due",
+            due="the calibration of these pictures is needed",
         )
     return rig.of_size(*min(holding, key=np.prod))
 
@@ -394,7 +395,7 @@ def _require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> N
     words = resolution.beyond(tracks.pixels, size)
     if words:
         raise ForeignFileError(
-            where, words, due="the calibration of these pictures, or pixels of those, are due"
+            where, words, due="the calibration of these pictures, or pixels of those, are expected"
         )
 
 
@@ -406,7 +407,7 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
         raise ForeignFileError(
             source,
             "no pixel is one of the calibration's lenses",
-            due="pixels as the cameras took them are due, of the calibration's resolution",
+            due="pixels as the cameras took them are expected, of the calibration's resolution",
         )
     return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
 
@@ -455,7 +456,7 @@ def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) 
     if frame_t_ns[-1] < t_ns[0] or t_ns[-1] < frame_t_ns[0]:
         raise PelorusError(
             f"the truth spans {t_ns[0]} to {t_ns[-1]} ns, the frames {frame_t_ns[0]} to "
-            f"{frame_t_ns[-1]} ns: they do not overlap; times on the twists' clock are due"
+            f"{frame_t_ns[-1]} ns: they do not overlap; times on the twists' clock are expected"
         )
     if own[0] < t_ns[0] <= own[0] + _resolution_ns(t_ns):
         t_ns = np.concatenate((own[:1], t_ns[1:]))  # it was rounded

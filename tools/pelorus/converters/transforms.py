@@ -103,7 +103,8 @@ class Tree:
         if meeting is None:
             raise PelorusError(
                 f"{self.bag.path}: no chain of transforms joins {first!r} and {last!r}: they end "
-                f"at {up[-1]!r} and at {down[-1]!r}; --extrinsic FILE is due, or --body-frame and "
+                f"at {up[-1]!r} and at {down[-1]!r}; --extrinsic FILE is expected, or "
+                "--body-frame and "
                 f"--camera-frame, one of {self.listing}"
             )
         up, down = up[: up.index(meeting) + 1], down[: down.index(meeting)]
@@ -120,7 +121,7 @@ class Tree:
         if not self.knows(frame):
             raise PelorusError(
                 f"{self.bag.path}: no transform of /tf_static has the frame {frame!r}; --extrinsic "
-                f"FILE is due, or --body-frame and --camera-frame, one of {self.listing}"
+                f"FILE is expected, or --body-frame and --camera-frame, one of {self.listing}"
             )
         found = [frame]
         while found[-1] in self.links and self.links[found[-1]].parent not in found:
@@ -133,12 +134,12 @@ class Tree:
             said = " and ".join(sorted(self.double[child]))
             raise PelorusError(
                 f"{self.bag.path}: /tf_static says twice, and differently, where {child!r} stands "
-                f"(in {said}); --extrinsic FILE is due"
+                f"(in {said}); --extrinsic FILE is expected"
             )
         if child in self.moving:
             raise PelorusError(
                 f"{self.bag.path}: {parent!r} to {child!r} moves (/tf), so it tells no mounting; "
-                "--extrinsic FILE is due, or --body-frame on the camera's side of it"
+                "--extrinsic FILE is expected, or --body-frame on the camera's side of it"
             )
 
     def optical_of(self, frame: str) -> list[str]:

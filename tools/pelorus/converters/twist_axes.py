@@ -35,17 +35,20 @@ def in_body(
         raise ForeignFileError(
             twists.where,
             f"has no orientation, and --twist-in {asked.value} turns by it",
-            due="nav_msgs/Odometry with its pose is due, or CSV with qx, qy, qz, qw (and px_m, "
+            due="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
+            "px_m, "
             "py_m, pz_m)",
         )
     if not twists.is_whole:
-        raise PelorusError(f"--twist-in {asked.value}: all six velocities are due")
+        raise PelorusError(f"--twist-in {asked.value}: all six velocities are expected")
     has_place = bool(np.isfinite(poses.p).all())
     if asked is TwistIn.AUTO:
         asked = _told(twists, poses, remarks) if has_place else TwistIn.BODY
     if asked is TwistIn.POSES:
         if not has_place:
-            raise ForeignFileError(twists.where, "has no places", due="px_m, py_m, pz_m are due")
+            raise ForeignFileError(
+                twists.where, "has no places", due="px_m, py_m, pz_m are expected"
+            )
         return _of_poses(twists, poses, timing)
     v, w = twists.v_B_mps, twists.w_B_radps
     if asked in (TwistIn.WORLD, TwistIn.WORLD_VELOCITY):

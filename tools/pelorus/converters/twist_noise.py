@@ -49,7 +49,7 @@ def suggest(recording: Recording) -> tuple[Recording, Finding]:
     seen = seen_pairs(recording.tracks, camera, 1)
     usable = seen.counts() >= PAIRS_ENOUGH
     if usable.sum() < FRAMES_ENOUGH:
-        evidence = f"{int(usable.sum())} frames with tracks enough, {FRAMES_ENOUGH} are due"
+        evidence = f"{int(usable.sum())} frames with tracks enough, {FRAMES_ENOUGH} are expected"
         action = "no suggestion: give the sigmas"
         return recording, Finding(subject, False, evidence, action, told=False)
     tau_s = np.diff(recording.frame_t_ns)[usable] * 1e-9

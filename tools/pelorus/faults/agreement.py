@@ -32,7 +32,7 @@ CHANCE = 2.0  # standard errors that near and far may differ by
 
 @dataclass(frozen=True)
 class Agreement:
-    """`scale` 1, `lever_m` 0 and `offset_s` 0 are due; sigmas stand beside them."""
+    """`scale` 1, `lever_m` 0 and `offset_s` 0 are expected; sigmas stand beside them."""
 
     frames: int
     scale: float  # beside a bias
@@ -44,9 +44,9 @@ class Agreement:
     offset_s: float  # to be added to the frames' times
     offset_sigma_s: float
     speed_mps: float
-    turn_scale: float  # 1 is due
+    turn_scale: float  # 1 is expected
     turn_scale_sigma: float
-    focal: float = 1.0  # times the given one, by an IMU; 1 is due
+    focal: float = 1.0  # times the given one, by an IMU; 1 is expected
     focal_sigma: float = float("inf")
     tilt_rad: Floats | None = None  # of the camera in the body's axes, beside the given; by twists
     tilt_covariance: Floats | None = None

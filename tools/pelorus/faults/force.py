@@ -4,7 +4,7 @@
 With R(t) the attitude from the start of a stretch on, as gyro or images have it, the velocity is
 V + g t + int R M (a - b_a): V and g, three numbers each, are unknown in every stretch, and so is
 what the accelerometer is off by. All of them enter linearly, so what is measured is left to least
-squares: M, of which the identity is due, or one scale; biases; and the clock.
+squares: M, of which the identity is expected, or one scale; biases; and the clock.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Faults of what lies between camera and body: units, axes, extrinsic, lever, scale and clocks.
 
-Each is told by how far it is from what is due, in its own standard errors, and by whether that
+Each is told by how far it is from what is expected, in its own standard errors, and by whether that
 matters. What the data cannot tell apart is not guessed at.
 """
 
@@ -329,7 +329,7 @@ def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
 
 
 def _words(F: Floats) -> str:
-    """y for x, -z for z: y = F b, so what stands as b's k-th is that axis of what is due."""
+    """y for x, -z for z: y = F b, so what stands as b's k-th is that axis of what is expected."""
     parts = [f"{_axis_name(column)} for {'xyz'[k]}" for k, column in enumerate(F.T)]
     return ", ".join(part for k, part in enumerate(parts) if not part.startswith("xyz"[k]))
 

@@ -2,11 +2,11 @@
 """Is an IMU in the axes and units that the extrinsic and the HEADER mean?
 
 Between what the images show in body axes and what the readings say stands a matrix, of which the
-identity is due: M_w for the rates of turn, M_a for the specific force. Both are measured, and the
-simplest fault that explains both is named: units and signs, the extrinsic's inverse, axes that are
-turned, mirrored or swapped, for gyro and accelerometer together or for one of them, any rotation.
-Attitudes are the images' own where the gyro is wrong, so that it does not spoil the force. What the
-drive does not move, the matrices do not tell, and nothing is said of it.
+identity is expected: M_w for the rates of turn, M_a for the specific force. Both are measured, and
+the simplest fault that explains both is named: units and signs, the extrinsic's inverse, axes that
+are turned, mirrored or swapped, for gyro and accelerometer together or for one of them, any
+rotation. Attitudes are the images' own where the gyro is wrong, so that it does not spoil the
+force. What the drive does not move, the matrices do not tell, and nothing is said of it.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Explained:
-    """What is due if this is the fault."""
+    """What is expected if this is the fault."""
 
     name: str
     words: str

@@ -47,7 +47,9 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     distance = np.linalg.norm(apart, axis=1)
     turning = usable & (distance > SEPARATED_MIN_M)
     if turning.sum() < PAIRS_MIN:
-        evidence = f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are due"
+        evidence = (
+            f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are expected"
+        )
         return recording, Finding(SUBJECT, False, evidence, "left as given", told=False)
     way = _way(recording, seen_motion.R, given)
     columns = _columns(recording, seen_motion.R, way, apart)

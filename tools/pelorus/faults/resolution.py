@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Are the pixels those of the pictures for which the calibration was made?
 
-Pixels beyond the picture are not. Where it has room for them, the picture that the pixels fill is
-compared with the one about the principal point: both its sides must be off by the same factor, and
-by one that a camera's modes or a resized picture have, for it to be another resolution.
+Pixels beyond the picture are not, if their middle is that of a larger picture, too: points that
+move and columns that were swapped also leave it. Where it has room for them, the picture that the
+pixels fill is compared with the one about the principal point: both its sides must be off by the
+same factor, and by one that a camera's modes or a resized picture have, for it to be another
+resolution.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ ENDS = (0.002, 0.998)  # quantiles: the picture that pixels fill, but for wild o
 FACTORS = (1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0, 4.0)
 NEAR, ALIKE = 0.12, 0.12  # logarithms: to such a factor, and of one side beside the other
 BEGINS = 0.1  # of the side, where the pixels must begin
+# Nearer to the middle of the next larger picture (3/2) than to that of this one.
+MIDDLE_LEAST = (1 / 2 + 3 / 4) / 2
 
 
 def beyond(pixels: Floats, size: tuple[int, int]) -> str:
@@ -29,7 +33,8 @@ def beyond(pixels: Floats, size: tuple[int, int]) -> str:
     if not size[0] or not len(pixels):
         return ""
     outside = (pixels.reshape(-1, 2, 2) > np.array(size) + BEYOND_PX).any(axis=(1, 2))
-    if outside.mean() <= BEYOND_SHARE:
+    middle = np.median(pixels.reshape(-1, 2), axis=0) / size
+    if outside.mean() <= BEYOND_SHARE or (middle < MIDDLE_LEAST).any():
         return ""
     most = np.quantile(pixels.reshape(-1, 2), ENDS[1], axis=0)
     times = float(np.max(most / size))
@@ -48,8 +53,8 @@ def of_resolution(recording: Recording) -> Iterator[Fault]:
     if not words:
         words = _about_centre(pixels, (header.camera.cx_px, header.camera.cy_px))
     if words:
-        due = "The calibration of these pictures is due: focal lengths and principal point scaled"
-        yield Fault("resolution", f"{words}. {due}")
+        remedy = "Give the calibration of these pictures: focal lengths and principal point scaled"
+        yield Fault("resolution", f"{words}. {remedy}")
 
 
 def _about_centre(pixels: Floats, centre: tuple[float, float]) -> str:

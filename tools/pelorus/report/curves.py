@@ -258,7 +258,8 @@ class Curves:
             )
         )
         about = (
-            "Innovations squared in their own sigmas, per degree of freedom (NIS): 1 is due, and "
+            "Innovations squared in their own sigmas, per degree of freedom (NIS): 1 is "
+            "expected, and "
             "95 % of the frames in the band if noise is as set. Above: pixel-sigma is too small."
         )
         lines = [("NIS", nis), ("low", low), ("high", high)]

@@ -214,7 +214,7 @@ class _Artist:
         if due[0] and (width, height) != due:
             raise PelorusError(
                 f"{where}: pictures of {width} x {height} pixels, and the log's are "
-                f"{due[0]} x {due[1]}: the rectified ones are due"
+                f"{due[0]} x {due[1]}: the rectified ones are expected"
             )
         scale = WIDTH_PX / width
         size = (WIDTH_PX, round(height * scale))

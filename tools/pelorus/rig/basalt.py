@@ -56,7 +56,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
         raise ForeignFileError(
             content.path,
             f"has {len(cameras)} cameras and {len(poses)} of T_imu_cam",
-            due="two of each are due",
+            due="two of each are expected",
         )
     lenses = [
         _lens(camera, sizes[k] if k < len(sizes) else [0, 0]) for k, camera in enumerate(cameras)
@@ -74,7 +74,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
 def _each(whole: Named, name: str) -> list[Named]:
     value = whole.get(name)
     if not isinstance(value, list) or not all(isinstance(one, dict) for one in value):
-        raise whole.error(name, value, "a list with an object for each camera is due")
+        raise whole.error(name, value, "a list with an object for each camera is expected")
     return [Named(whole.path, one, f"value0.{name}[{k}]") for k, one in enumerate(value)]
 
 

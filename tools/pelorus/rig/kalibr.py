@@ -68,7 +68,9 @@ def is_imu(content: Named) -> bool:
 def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
     """Of two cameras: those asked for by name or topic, else the two that are a pair."""
     if "cam1" not in content:
-        raise ForeignFileError(content.path, "has one camera, cam0", due="cam0 and cam1 are due")
+        raise ForeignFileError(
+            content.path, "has one camera, cam0", due="cam0 and cam1 are expected"
+        )
     names = [name for name in content.content if CAMERA.fullmatch(str(name))]
     cameras = [content.object(name) for name in sorted(names, key=lambda name: int(name[3:]))]
     if len(cameras) == 2 and not asked:
@@ -93,7 +95,7 @@ def _chained(cameras: Sequence[Named]) -> list[Poses]:
     for camera in cameras[1:]:
         if STEP not in camera:
             raise ForeignFileError(
-                camera.path, "does not say where it stands", at=camera.at, due=f"{STEP} is due"
+                camera.path, "does not say where it stands", at=camera.at, due=f"{STEP} is expected"
             )
         found.append(se3.compose(pose(camera, STEP), found[-1]))
     return found
@@ -116,7 +118,8 @@ def pair(first: Named, second: Named, step: Poses | None = None) -> Rig:
             raise ForeignFileError(
                 second.path,
                 f"{second.at or 'the second camera'} does not say where it stands",
-                due=f"{STEP} is due, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of both cameras",
+                due=f"{STEP} is expected, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of "
+                "both cameras",
             )
         steps = se3.compose(T_2B, se3.inverse(T_1B))
     elif step is None and T_1B is not None and T_2B is not None:
@@ -157,7 +160,7 @@ def imu(content: Named) -> ImuModel:
     told = {name: own.number(key) for name, key in NOISE.items() if key in own}
     for name, value in told.items():
         if value < 0:
-            raise own.error(NOISE[name], value, "a number that is not negative is due")
+            raise own.error(NOISE[name], value, "a number that is not negative is expected")
     correction, remarks = _correction(own)
     return ImuModel(Noise(**told), correction, tuple(f"{content.path}: {r}" for r in remarks))
 
@@ -190,7 +193,7 @@ def _inverse(content: Named, name: str) -> Floats:
         return np.eye(3)
     M = matrix(content, name, 3, 3)
     if not 0.5 < np.linalg.det(M) < 2:
-        raise content.error(name, M.tolist(), "a matrix near the identity is due")
+        raise content.error(name, M.tolist(), "a matrix near the identity is expected")
     return np.asarray(np.linalg.inv(M))
 
 
@@ -229,7 +232,9 @@ def matrix(content: Named, name: str, rows: int, columns: int) -> Floats:
     if found is not None and found.shape == (rows * columns,):
         found = found.reshape(rows, columns)
     if found is None or found.shape != (rows, columns) or not sane(found):
-        raise content.error(name, content.get(name), f"{rows} x {columns} finite numbers are due")
+        raise content.error(
+            name, content.get(name), f"{rows} x {columns} finite numbers are expected"
+        )
     return found
 
 
@@ -239,7 +244,7 @@ def _on_body(camera: Named) -> Poses | None:
         return None
     if len(given) > 1:
         raise ForeignFileError(
-            camera.path, f"has {' and '.join(given)}", at=camera.at, due="one of them is due"
+            camera.path, f"has {' and '.join(given)}", at=camera.at, due="one of them is expected"
         )
     T = pose(camera, given[0])
     return T if given[0] in TO_CAMERA else se3.inverse(T)
@@ -263,7 +268,7 @@ def _lens(camera: Named) -> Lens:
     given = camera.array("intrinsics", count + 4).tolist()
     sphere, numbers = given[:count], given[count:]
     if min(numbers[:2]) < FOCAL_MIN_PX:
-        raise camera.error("intrinsics", given, "[fx, fy, cx, cy] in px is due")
+        raise camera.error("intrinsics", given, "[fx, fy, cx, cy] in px is expected")
     model = LENSES[camera.word("distortion_model", tuple(LENSES))]
     if "resolution" not in camera:
         width, height = 0, 0
@@ -271,7 +276,7 @@ def _lens(camera: Named) -> Lens:
         width, height = camera.size("resolution")
     D = _coefficients(camera, model)
     if count and (D and (kind != "omni" or model is not LensModel.RADTAN)):
-        raise camera.error("distortion_model", model.value, f"none is due beside {kind}")
+        raise camera.error("distortion_model", model.value, f"none is expected beside {kind}")
     found = LensModel(kind) if count else model
     return Lens(found, tuple(numbers), (*sphere, *D), width, height)
 
@@ -285,7 +290,7 @@ def _coefficients(camera: Named, model: LensModel) -> tuple[float, ...]:
     found = as_numbers(value)
     if found is None or found.ndim != 1 or len(found) not in COEFFICIENTS[model]:
         due = " or ".join(map(str, COEFFICIENTS[model]))
-        raise camera.error(name, value, f"{due} numbers are due for {model}")
+        raise camera.error(name, value, f"{due} numbers are expected for {model}")
     return tuple(camera.array(name, len(found)).tolist())
 
 

@@ -61,7 +61,7 @@ def _lens(content: Named, number: int, model: LensModel | None) -> Lens:
         raise ForeignFileError(
             content.path,
             f"camera {number} has fx {fx:g}, fy {fy:g}, skew {K[0, 1]:g}",
-            due="positive focal lengths and no skew are due",
+            due="positive focal lengths and no skew are expected",
         )
     name = _one_of(content, DISTORTIONS, number)
     D = _numbers(content, name)
@@ -78,13 +78,13 @@ def _model(content: Named, name: str, count: int, asked: LensModel | None) -> Le
         raise ForeignFileError(
             content.path,
             f"{name} has 4 numbers, as radtan and a fisheye have",
-            due="--lens radtan or --lens equidistant is due",
+            due="--lens radtan or --lens equidistant is expected",
         )
     model = asked if asked in LENSES and asked is not None else LensModel.RADTAN
     if count not in COEFFICIENTS[model]:
         due = " or ".join(map(str, COEFFICIENTS[model]))
         raise ForeignFileError(
-            content.path, f"{name} has {count} numbers", due=f"{due} are due for {model}"
+            content.path, f"{name} has {count} numbers", due=f"{due} are expected for {model}"
         )
     return model
 
@@ -120,7 +120,7 @@ def xml_words(path: Path, words: str) -> dict[str, Any]:
     except ET.ParseError as error:
         raise ForeignFileError(path, f"is no XML: {error}") from None
     if root.tag != "opencv_storage":
-        raise ForeignFileError(path, f"is XML of {root.tag}", due="opencv_storage is due")
+        raise ForeignFileError(path, f"is XML of {root.tag}", due="opencv_storage is expected")
     return {one.tag: _value(one) for one in root}
 
 

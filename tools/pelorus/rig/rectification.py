@@ -63,7 +63,7 @@ class Rectification:
                 break
         assert found is not None
         if not np.isfinite([found.camera.cx_px, found.camera.cy_px]).all():
-            raise ValueError("no ray reaches the middle of the pictures; another lens is due")
+            raise ValueError("no ray reaches the middle of the pictures; another lens is expected")
         return found
 
     def pixels(self, raw: Floats) -> Floats:
@@ -133,7 +133,7 @@ def _towards(T_RL: Poses) -> Floats:
     if not x[0] > SIDEWAYS_MIN:
         raise ValueError(
             f"the second camera stands at ({at[0]:.3g}, {at[1]:.3g}, {at[2]:.3g}) m as the first "
-            "one sees it (x right, y down, z ahead); cameras side by side are due"
+            "one sees it (x right, y down, z ahead); cameras side by side are expected"
         )
     z -= x * (x @ z)
     z /= np.linalg.norm(z)

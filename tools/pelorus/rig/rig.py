@@ -95,7 +95,8 @@ class Rig:
             raise ForeignFileError(
                 self.path,
                 "does not say where the camera sits on the body",
-                due="a file with T_cam_imu or T_imu_cam is due (camchain-imucam), or --extrinsic "
+                due="a file with T_cam_imu or T_imu_cam is expected (camchain-imucam), or "
+                "--extrinsic "
                 "FILE: JSON with R_CB and t_CB_m, or R_BC and t_BC_m",
             )
         R = rectification.left.R
@@ -123,6 +124,8 @@ class Rig:
 def rigid(path: Path, name: str, matrix: Floats) -> Poses:
     """The 4 x 4 matrix as a pose. Files round: its rotation is made one."""
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
-        raise ForeignFileError(path, f"the last row of {name} is {matrix[3]}", due="0 0 0 1 is due")
+        raise ForeignFileError(
+            path, f"the last row of {name} is {matrix[3]}", due="0 0 0 1 is expected"
+        )
     R = arrays.rotation(path, name, matrix[:3, :3])
     return Poses(se3.nearest_rotation(R), matrix[:3, 3].copy())

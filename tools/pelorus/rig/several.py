@@ -90,7 +90,7 @@ def _asked(path: Path, cameras: Sequence[Camera], asked: Sequence[str]) -> tuple
         found += of_name
     if len(found) != 2 or found[0] == found[1]:
         raise ForeignFileError(
-            path, f"--cameras {','.join(asked)}", due="two cameras, parted by a comma, are due"
+            path, f"--cameras {','.join(asked)}", due="two cameras, parted by a comma, are expected"
         )
     return found[0], found[1]
 

@@ -99,7 +99,7 @@ def require(name: str, value: object, good: bool, due: str) -> None:
     """Refuse a value by its option's name."""
     if not good:
         shown = ",".join(f"{x:g}" for x in value) if isinstance(value, tuple) else value
-        raise PelorusError(f"{option_name(name)} is {shown}: {due} is due")
+        raise PelorusError(f"{option_name(name)} is {shown}: {due} is expected")
 
 
 def check(given: Any, prefix: str = "") -> None:

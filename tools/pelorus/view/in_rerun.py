@@ -193,7 +193,7 @@ def _await_viewer() -> None:
 def _require_viewer(url: str) -> None:
     """The SDK itself waits for one for ever."""
     forms = " or ".join(SCHEMES)
-    due = PelorusError(f"{url}: is no viewer's address: {forms}://HOST:{PORT}/proxy is due")
+    due = PelorusError(f"{url}: is no viewer's address: {forms}://HOST:{PORT}/proxy is expected")
     try:
         at = urlsplit(url)
         port = at.port or PORT
