@@ -25,7 +25,9 @@
 #include "process/alignment.h"
 #include "process/process.h"
 #include "process/velocity.h"
+#include "sensor/kept.h"
 #include "sensor/sensor.h"
+#include "sensor/standstill.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
 #include "state/calibration.h"
@@ -326,8 +328,9 @@ static plr_status estimate(plr_filter *f, plr_sightings *frame, plr_report *repo
     }
     plr_reading still;
     plr_reading_result unused = {0};
-    const bool stands = f->source.reading_valid &&
-                        plr_standstill_is_seen(&f->belief, &f->camera, &f->config, frame, &still);
+    const bool stands =
+        f->source.reading_valid && plr_standstill_is_seen(&f->belief, &f->camera, frame,
+                                                          f->config.standstill_sigma_mps, &still);
     const bool is_state = plr_process_of(&f->source)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);

@@ -8,7 +8,9 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/settings.h"
+#include "pelorus/source.h"
 
 /* Not started, nothing averaged. */
 void plr_alignment_clear(const plr_belief *belief, plr_source *source);

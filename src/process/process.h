@@ -8,7 +8,9 @@
 #ifndef PLR_PROCESS_PROCESS_H
 #define PLR_PROCESS_PROCESS_H
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/settings.h"
+#include "pelorus/source.h"
 #include "state/rows.h"
 
 enum { PLR_READING_DIM = PLR_POSE_DIM };

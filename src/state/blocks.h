@@ -7,7 +7,7 @@
 #include <stdbool.h>
 
 #include "pelorus/assertions.h"
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
 
 /* A block that the process does not estimate has no rows. */
 static inline bool plr_has_block(const plr_belief *belief, plr_block_id block) {

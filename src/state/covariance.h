@@ -8,7 +8,9 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/camera.h"
+#include "pelorus/workspace.h"
 #include "state/blocks.h"
 #include "state/model.h"
 #include "state/motion.h"

@@ -4,7 +4,7 @@
 #define PLR_STATE_ELEMENTS_H
 
 #include "math/packed.h"
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
 
 /* B (rows x columns) = P[row.., column..], dense, on either side of the diagonal. */
 static inline void plr_get_block(const plr_belief *belief, unsigned row, unsigned rows,

@@ -4,7 +4,8 @@
 #ifndef PLR_STATE_MOTION_H
 #define PLR_STATE_MOTION_H
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/workspace.h"
 
 /* Nothing accumulated: D = I, Q = 0, B = 0; velocity and biases as they are. */
 void plr_motion_clear(const plr_belief *belief, plr_motion *motion);

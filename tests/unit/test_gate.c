@@ -79,7 +79,7 @@ static void check_model(plr_model_kind model) {
             const plr_verdict verdict = specimen_judge(&filter, slot, &seen);
             /* S holds variances of up to 1000 px^2 beside 2: a thousand roundings */
             TEST_ASSERT_DOUBLE_WITHIN(d2 * 3000 * eps, d2, (double)verdict.d2);
-            TEST_ASSERT_DOUBLE_WITHIN(gain * 3000 * eps, gain, (double)verdict.gain);
+            TEST_ASSERT_DOUBLE_WITHIN(gain * 3000 * eps, gain, (double)verdict.det_S);
             TEST_ASSERT_TRUE(verdict.accepted); /* the specimen's gate is off */
         }
     }
@@ -139,7 +139,7 @@ static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
     filter.belief.slots[3].x[2] = PLR_R(0.2);
     const plr_verdict verdict = specimen_judge(&filter, 3, &seen);
     TEST_ASSERT_FALSE(verdict.accepted);
-    TEST_ASSERT_TRUE(isfinite((double)verdict.d2) && isfinite((double)verdict.gain));
+    TEST_ASSERT_TRUE(isfinite((double)verdict.d2) && isfinite((double)verdict.det_S));
 }
 
 /* A sigma of more than a focal length in the image is no basis for a linearisation, unless the place
