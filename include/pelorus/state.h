@@ -52,7 +52,7 @@ typedef struct plr_guard {
 } plr_guard;
 
 /* The checksums depend on the order of the members: config to par never change after init, work
- * changes without a checksum, guard is last. See src/filter/guard.h. */
+ * and evidence change without a checksum, guard is last. See src/filter/guard.h. */
 typedef struct plr_filter {
     uint32_t magic; /* set by a successful init */
     plr_config config;
@@ -64,6 +64,7 @@ typedef struct plr_filter {
     plr_motion motion; /* since the last frame */
     plr_belief belief;
     plr_workspace work;
+    plr_frame_evidence evidence; /* of this frame, for the supervisor */
 
     plr_supervisor supervisor;
     uint16_t frames_off_the_map; /* in succession, that rejected nearly all known landmarks */

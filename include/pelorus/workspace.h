@@ -5,7 +5,6 @@
 #define PELORUS_WORKSPACE_H
 
 #include "pelorus/config.h"
-#include "pelorus/supervisor.h"
 #include "pelorus/types.h"
 
 /* The noise of a frame's motion. It is kept apart from P until the frame's observations have been
@@ -62,10 +61,9 @@ typedef struct plr_workspace {
      * The kernels read a little further than they use, hence the margins. */
     plr_real Vt[PLR_WORK_ROWS * PLR_MAX_LD + PLR_KERNEL_MARGIN];
     plr_real dx[PLR_MAX_LD];
-    plr_noise noise;             /* of the motion that this frame applies */
-    plr_learnt learnt;           /* what this correction says of the calibration */
-    plr_frame_evidence evidence; /* of this frame, for the supervisor */
-    plr_sightings sightings;     /* the frame */
+    plr_noise noise;         /* of the motion that this frame applies */
+    plr_learnt learnt;       /* what this correction says of the calibration */
+    plr_sightings sightings; /* the frame */
 } plr_workspace;
 
 #endif

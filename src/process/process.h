@@ -2,7 +2,7 @@
 /*
  * A process moves the state between frames by readings of six numbers, linear ones first. It lays
  * out the blocks that it needs, carries pose (and velocity) along with each reading, and
- * accumulates in f->motion what a frame will apply to P: a reading costs the same for any number of
+ * accumulates in plr_motion what a frame will apply to P: a reading costs the same for any number of
  * landmarks.
  */
 #ifndef PLR_PROCESS_PROCESS_H

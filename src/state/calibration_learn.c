@@ -11,9 +11,8 @@
 
 enum {
     K = PLR_CALIBRATIONS,
-    MOST_SIGMAS = 5,   /* of the prior, in one correction: more is no calibration */
-    LEARNT_SIGMAS = 4, /* by which a number may have moved, of what is learnt of it */
-    MOST_MISFITS = 10  /* frames that would move it farther, until it is refused */
+    MOST_SIGMAS = 5,  /* of the prior, in one correction: more is no calibration */
+    LEARNT_SIGMAS = 4 /* by which a number may have moved, of what is learnt of it */
 };
 
 /* What a frame says of the calibration is added up over some 32 frames, seconds of a camera: slow errors
@@ -184,10 +183,6 @@ static bool may_move(const plr_camera_model *camera, const plr_real *G, const pl
     return moved * moved <= PLR_R(LEARNT_SIGMAS * LEARNT_SIGMAS) * (learnt + LITTLE * prior);
 }
 
-bool plr_calibration_refuses(const plr_camera_model *camera, unsigned k) {
-    return camera->estimate.misfits[k] >= MOST_MISFITS;
-}
-
 /* The state and the camera as if nothing had been learnt: what was moved is no error of the calibration. A number
  * that is refused is considered from now on, and the others are learnt anew. */
 static void put_back(const plr_belief *belief, plr_camera_model *camera, plr_real *dx) {
@@ -258,11 +253,4 @@ void plr_calibration_learn(const plr_belief *belief, plr_camera_model *camera,
     c->excess = excess;
     plr_combine_rows(plr_covariance_dim(belief), n, ds, 1, belief->S[0], PLR_MAX_LD, work->dx);
     plr_calibration_correct(camera, ds);
-}
-
-bool plr_calibration_is_off(const plr_camera_model *camera) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&camera->errors); k++)
-        if (plr_calibration_refuses(camera, k))
-            return true;
-    return false;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* The motion since landmarks and covariance were last moved. The pose contains it already;
- * f->motion accumulates it until a frame applies it to them (docs/MATH.md 4 and 6). */
+ * plr_motion accumulates it until a frame applies it to them (docs/MATH.md 4 and 6). */
 #ifndef PLR_STATE_MOTION_H
 #define PLR_STATE_MOTION_H
 

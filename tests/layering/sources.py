@@ -100,7 +100,7 @@ SIBLINGS: dict[str, set[str]] = {
     "camera.h": {"config.h"},
     "belief.h": {"config.h", "types.h"},
     "source.h": {"config.h", "types.h"},
-    "workspace.h": {"config.h", "supervisor.h", "types.h"},
+    "workspace.h": {"config.h", "types.h"},
     "map.h": {"types.h"},
     "settings.h": {"config.h", "types.h"},
     "supervisor.h": {"config.h", "types.h", "limits.def"},
