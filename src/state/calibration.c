@@ -8,6 +8,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/camera.h"
 #include "state/pose.h"
@@ -126,6 +127,7 @@ void plr_calibration_reset(plr_camera_model *camera) {
 }
 
 bool plr_calibration_refuses(const plr_camera_model *camera, unsigned k) {
+    PLR_ASSERT(k < PLR_CALIBRATIONS);
     return camera->estimate.misfits[k] >= MOST_MISFITS;
 }
 

@@ -7,6 +7,7 @@
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 
 enum {
@@ -87,6 +88,7 @@ static bool correct_factor(const plr_camera_model *camera, const plr_learnt *lea
 /* x += Sigma y, of the estimated errors. */
 static void add_product(const plr_camera_model *camera, const plr_real *G, const plr_real *D,
                         const plr_real *y, plr_real *x) {
+    PLR_ASSERT(camera->errors.estimated <= camera->errors.count);
     for (unsigned k = 0; k < plr_calibration_estimated(&camera->errors); k++)
         add(k + 1, D[k] * dot(k + 1, G + K * k, y), G + K * k, x);
 }
@@ -230,6 +232,7 @@ static void leave_out_refused(const plr_camera_model *camera, plr_learnt *learnt
 
 void plr_calibration_learn(const plr_belief *belief, plr_camera_model *camera,
                            plr_workspace *work) {
+    PLR_ASSERT(camera->errors.count == belief->layout.errors);
     plr_camera_estimate *c = &camera->estimate;
     const plr_error_columns *errors = &camera->errors;
     const unsigned n = plr_calibration_estimated(errors);
