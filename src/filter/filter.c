@@ -180,6 +180,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     f->clock_started = f->source.reading_valid = 0;
     memset(f->source.reading, 0, sizeof f->source.reading);
     memset(f->belief.bias, 0, sizeof f->belief.bias);
+    memset(f->belief.velocity, 0, sizeof f->belief.velocity);
     memset(f->belief.p_WB, 0, sizeof f->belief.p_WB);
     memset(&f->totals, 0, sizeof f->totals);
     plr_mat3_identity(f->belief.R_WB);

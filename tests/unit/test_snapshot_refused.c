@@ -115,8 +115,8 @@ static void test_more_landmarks_than_slots_are_refused(void) {
 static void test_numbers_that_are_not_finite_are_refused(void) {
     const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
     const uint32_t P_at = place_of_P();
-    const uint32_t places[] = {state_place("time", "interval_s"),
-                               state_place("filter", "core_motion.V"),
+    const uint32_t places[] = {state_place("time", "source.interval_s"),
+                               state_place("filter", "motion.core.V"),
                                state_place("filter", "supervisor.statistic"),
                                state_place("slot", "x"),
                                state_place("slot", "beyond"),
@@ -144,7 +144,7 @@ static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not
 
 static void test_a_flag_is_0_or_1(void) {
     const uint32_t flags[] = {
-        state_place("time", "clock_started"),         state_place("time", "reading_valid"),
+        state_place("time", "clock_started"),         state_place("time", "source.reading_valid"),
         state_place("filter", "supervisor.outright"), state_place("filter", "supervisor.misfits"),
         state_place("filter", "supervisor.frozen"),   state_place("slot", "known"),
         state_place_of_landmark(1, "known")};
