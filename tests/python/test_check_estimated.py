@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from converted import Once
 from pelorus.check import verdict
-from pelorus.check.calibration import Calibration
+from pelorus.check.calibration import CalibrationDoubts
 from pelorus.check.estimated import Estimated, estimated, without_clock
 from pelorus.check.mount import Turned
 from pelorus.check.verdict import Grade
@@ -48,7 +48,7 @@ def in_body(recording: Path) -> Floats:
 
 
 def found(log: Sequence[Message], turn: Turned | None = None) -> Estimated:
-    told = estimated(log, Calibration(None, turn))
+    told = estimated(log, CalibrationDoubts(None, turn))
     assert told is not None
     return told
 
@@ -60,10 +60,12 @@ def test_a_turn_that_filter_and_search_see_is_told_once(turned: Path) -> None:
     own = found(log, search)
     assert own.answers_turn
     assert not own.is_doubtful
-    said = list(verdict.of_calibration(Calibration(None, search), own))
+    said = list(verdict.of_calibration(CalibrationDoubts(None, search), own))
     assert [remark.grade for remark in said] == [Grade.GOOD]
     assert "corrected by turn of the camera about its" in said[0].text
-    assert [r.grade for r in verdict.of_calibration(Calibration(None, search))] == [Grade.CARE]
+    assert [r.grade for r in verdict.of_calibration(CalibrationDoubts(None, search))] == [
+        Grade.CARE
+    ]
 
 
 def test_a_search_that_sees_another_turn_is_told(turned: Path) -> None:
@@ -72,7 +74,7 @@ def test_a_search_that_sees_another_turn_is_told(turned: Path) -> None:
     own = found(log, search)
     assert own.is_doubtful
     assert "the search sees the camera turned otherwise" in own.words()
-    said = list(verdict.of_calibration(Calibration(None, search), own))
+    said = list(verdict.of_calibration(CalibrationDoubts(None, search), own))
     assert len(said) == 2
 
 
@@ -100,7 +102,7 @@ def test_a_calibration_that_is_right_is_said_to_be(turned: Path) -> None:
     right = replace(own, told=replace(own.told, corrected=np.zeros(11)))
     assert "finds it right: baseline to" in right.words()
     assert (
-        estimated(replayed(built_programs().float32, messages_of(turned), []), Calibration())
+        estimated(replayed(built_programs().float32, messages_of(turned), []), CalibrationDoubts())
         is None
     )
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.calibrated import PARTS, Calibrated, Part, last_calibrated
-from pelorus.check.calibration import Calibration
+from pelorus.calibrated import PARTS, Calibrated, CalibrationPart, last_calibrated
+from pelorus.check.calibration import CalibrationDoubts
 from pelorus.check.mount import SURE, Turned
 from pelorus.check.options import Settings
 from pelorus.frames import Message
@@ -82,11 +82,11 @@ class Estimated:
         return bool(self.off or self.refused) or (self.apart or 0.0) > SURE
 
 
-def _with_sigma(part: Part, value: float, sigma: float) -> str:
+def _with_sigma(part: CalibrationPart, value: float, sigma: float) -> str:
     return f"{part.name} {value:+.3g} +- {sigma:.2g} {part.unit}"
 
 
-def estimated(messages: Sequence[Message], found: Calibration) -> Estimated | None:
+def estimated(messages: Sequence[Message], found: CalibrationDoubts) -> Estimated | None:
     """Returns what a run estimated; None where nothing is estimated."""
     told = last_calibrated(messages)
     if told is None:

@@ -29,9 +29,9 @@ from pelorus.check.parameters import (
     starting,
     written,
 )
-from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
+from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
 from pelorus.check.tracks_noise import DRIFT, TrackNoise, told_apart, track_noise
-from pelorus.converters.twist_noise import Spread, difference_of_a_reading
+from pelorus.converters.twist_noise import TwistSpread, difference_of_a_reading
 
 SPREAD_FRAMES = 20  # enough to measure a spread to a fifth, as a start
 FINE = (1.3, 1.15)
@@ -101,7 +101,7 @@ def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[s
     return min(found, key=lambda some: some.outcome.cost).values
 
 
-def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
+def _of_twists(start: Mapping[str, float], spread: TwistSpread) -> dict[str, float]:
     """Returns the twists' sigmas alone, as the images show them."""
     said = {"velocity": spread.velocity_mps, "gyro": spread.gyro_radps}
     of = {name: said.get(name.partition("-")[0], 0.0) for name in start}
@@ -113,7 +113,7 @@ def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
 
 def _of_drifting_tracks(
     bench: Bench, fixed: Settings, start: Mapping[str, float], noise: TrackNoise
-) -> Found:
+) -> BestFound:
     """Keeps the given sigmas unless the data contradict them, and takes pixel-sigma from the
     tracks.
     """
@@ -125,7 +125,7 @@ def _of_drifting_tracks(
         for name, value in _of_twists(start, most).items():
             if value < start[name] and told_apart(value, start[name]):
                 values[name] = value
-    return Found(values, bench.run({**fixed, **written(values, TWIST)}))
+    return BestFound(values, bench.run({**fixed, **written(values, TWIST)}))
 
 
 # --- clocks ---------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def clocked(
     values: Mapping[str, float],
     given: Settings,
     off: float = 0.0,
-) -> tuple[dict[str, str], Found, str]:
+) -> tuple[dict[str, str], BestFound, str]:
     """Returns timing and offset of the camera's clock as settings, the noises again if these
     change, and words.
 
@@ -191,7 +191,7 @@ def _moved(
 # --- axes -----------------------------------------------------------------------------------------
 
 
-def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
+def _axes(bench: Bench, fixed: Settings, found: BestFound) -> tuple[BestFound, str]:
     """Returns a sigma for each axis where that pays: two parameters more for each kind."""
     split = {"pixel": found.values["pixel"]}
     for name in ("velocity", "gyro"):
@@ -206,10 +206,10 @@ def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
     for name in ("velocity", "gyro"):
         alike = {k: v for k, v in result.values.items() if not k.startswith(name)}
         alike |= {name: pooled(result.values, name)}
-        one = Found(alike, bench.run({**fixed, **written(alike, TWIST)}))
+        one = BestFound(alike, bench.run({**fixed, **written(alike, TWIST)}))
         if name in found.values:  # starts from the best value for all axes
             best = {**alike, name: found.values[name]}
-            other = Found(best, bench.run({**fixed, **written(best, TWIST)}))
+            other = BestFound(best, bench.run({**fixed, **written(best, TWIST)}))
             one = min(one, other, key=lambda some: some.outcome.cost)
         gain = result.outcome.gain_over(one.outcome)
         if gain > 2 * PAYS:

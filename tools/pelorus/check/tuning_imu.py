@@ -30,7 +30,7 @@ from pelorus.check.parameters import (
     starting,
     written,
 )
-from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
+from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
 from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
 from pelorus.inertial_survey import scatter
 
@@ -184,7 +184,7 @@ def _scatter(bench: Bench) -> dict[str, float]:
     return {"gyro": gyro, "accel": accel}
 
 
-def _at_least_scatter(bench: Bench, side: Settings, found: Found) -> Found:
+def _at_least_scatter(bench: Bench, side: Settings, found: BestFound) -> BestFound:
     """Raises noises below the filter's own least ones to these: below them the likelihood is
     constant.
     """
@@ -192,11 +192,11 @@ def _at_least_scatter(bench: Bench, side: Settings, found: Found) -> Found:
     values = {name: max(value, least.get(name, 0.0)) for name, value in found.values.items()}
     if values == found.values:
         return found
-    return Found(values, bench.run({**side, **written(values, IMU)}))
+    return BestFound(values, bench.run({**side, **written(values, IMU)}))
 
 
 def _untold(
-    bench: Bench, side: Settings, found: Found, parameters: Mapping[str, Parameter]
+    bench: Bench, side: Settings, found: BestFound, parameters: Mapping[str, Parameter]
 ) -> list[str]:
     """Returns the settings for which far larger or smaller values would be about as likely."""
     out = []
@@ -219,8 +219,8 @@ def _of_drive(untold: list[str]) -> str:
 
 
 def noises(
-    bench: Bench, side: Settings, found: Found, given: Mapping[str, float]
-) -> tuple[Found, str]:
+    bench: Bench, side: Settings, found: BestFound, given: Mapping[str, float]
+) -> tuple[BestFound, str]:
     """Keeps a given noise that the drive cannot measure, if it is about as likely and no smaller.
 
     Trusting an IMU too much is the worse fault. Where the frames measure the motion far better than
@@ -233,7 +233,7 @@ def noises(
             values = {**found.values, name: given[name]}
             usual = bench.run({**side, **written(values, IMU)})
             if found.outcome.gain_over(usual) < PAYS:
-                found = Found(values, usual)
+                found = BestFound(values, usual)
     if not untold:
         return found, "pixel-sigma, gyro-noise and accel-noise are told by the drive"
     kept = ", ".join(f"{found.values[n]:.3g}" for n in IMU if IMU[n].setting in untold)

@@ -17,7 +17,7 @@ from pelorus.frames import Config, Header, Kind, Process
 from pelorus.inertial_survey import ImuSurvey
 from pelorus.settings import IDS, describe
 from pelorus.small_sensors import SMALL_SENSORS
-from pelorus.survey import Survey, Tracks, require_useful, survey
+from pelorus.survey import Survey, TrackSurvey, require_useful, survey
 
 GAPS_SHOWN = 5
 SPELLS_SHOWN = 40
@@ -190,7 +190,7 @@ def _ranges(axes: Sequence[tuple[float, float]]) -> str:
     return ", ".join(f"{least:.3g} to {most:.3g}" for least, most in axes) or "nothing"
 
 
-def _show_tracks(tracks: Tracks) -> None:
+def _show_tracks(tracks: TrackSurvey) -> None:
     least, median, most = tracks.per_frame
     out.print(
         f"{tracks.observations} observations, {least} / {median} / {most} a frame "

@@ -118,7 +118,7 @@ def _draw(
     """Writes pictures and page; returns the page's verdict, and further remarks."""
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page  # noqa: PLC0415 - as above
-    from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
+    from pelorus.report.beside import NamedLog, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
     from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
@@ -138,7 +138,7 @@ def _draw(
     found = explain(main.messages)
     with waiting("judging"):
         verdict = found.verdict
-    drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
+    drift = drift_table([NamedLog(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
     answer = answers.with_setup(answer, main.messages)
     if source is not None:

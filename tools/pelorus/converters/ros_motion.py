@@ -60,7 +60,7 @@ class Wheels:
 
 
 @dataclass(frozen=True)
-class Moving:
+class MotionTopics:
     """The topics that the user names; others are taken where there is only one."""
 
     twist: str = ""
@@ -81,7 +81,7 @@ class Rows(NamedTuple):
 
 
 def read(
-    bag: Bag, topics: Moving, asked: Asked, tree: Tree, remarks: list[str]
+    bag: Bag, topics: MotionTopics, asked: Asked, tree: Tree, remarks: list[str]
 ) -> Twists | Readings:
     """Reads the motion from the named topics, else from the only ones."""
     found = _alone(bag, topics, asked, remarks)
@@ -113,7 +113,7 @@ def _timing(asked: Asked) -> TwistTiming:
     return TwistTiming.START if asked.timing is None else asked.timing
 
 
-def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists | Readings:
+def _alone(bag: Bag, topics: MotionTopics, asked: Asked, remarks: list[str]) -> Twists | Readings:
     """Reads the motion without the gyro beside twists."""
     named = [topic for topic in (topics.twist, topics.imu) if topic]
     if len(named) + (topics.wheels is not None) > 1:

@@ -40,7 +40,7 @@ TILT_RAD, LEVER_M = 0.05, 1.0
 
 
 @dataclass(frozen=True)
-class Duel:
+class AxesDuel:
     """The best of all ways against the given axes."""
 
     F: Floats
@@ -78,10 +78,10 @@ class Duel:
         return self.is_far and self.shared > SURE_SHARED
 
 
-STAYS = Duel(np.eye(3), 0.0, float("inf"), 0.0, False, 0.0)
+STAYS = AxesDuel(np.eye(3), 0.0, float("inf"), 0.0, False, 0.0)
 
 
-class Rates:
+class MotionPairs:
     """Rates or velocities by images and twists, and how well each of the 48 ways matches them.
 
     `seen` (n, 3) by the images in the given body axes, `told` by the twists. For velocities `turns`
@@ -105,11 +105,11 @@ class Rates:
             _cost(e, beside, self._spread)[0] for e, beside in zip(errors, besides, strict=True)
         ]
 
-    def alone(self) -> Duel:
+    def alone(self) -> AxesDuel:
         """Returns the best of all ways."""
         return self.beside(int(np.argmin(self.costs))) if self.enough else STAYS
 
-    def beside(self, k: int) -> Duel:
+    def beside(self, k: int) -> AxesDuel:
         """Returns the k-th of the ways against the given axes."""
         if k == 0:
             return STAYS
@@ -117,7 +117,7 @@ class Rates:
         return replace(found, by_ways=self._by_ways)
 
 
-def best_of_both(way: Rates, turn: Rates) -> tuple[Duel, Duel]:
+def best_of_both(way: MotionPairs, turn: MotionPairs) -> tuple[AxesDuel, AxesDuel]:
     """Returns the axes of velocities and of rates of turn.
 
     Each is decided alone where it is significant; otherwise both together for a whole body: a way
@@ -180,7 +180,7 @@ def _solved(error: Floats, nuisance: Floats, trust: Floats) -> Floats:
     return np.asarray(np.linalg.solve(A, trusted.T @ error.ravel()))
 
 
-def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Floats) -> Duel:
+def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Floats) -> AxesDuel:
     trust = np.ones(told.shape) / spread
 
     def free(x: Floats) -> Floats:
@@ -212,4 +212,4 @@ def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Float
     sums = np.bincount(at, same)
     shared = float(np.sum(sums) / (np.sqrt(blocks) * np.std(sums, ddof=1) + 1e-12))
     share = np.sum(weight[:, None] * left**2) / (np.sum(weight[:, None] * shown**2) + 1e-12)
-    return Duel(F, effect, sigma, z, False, 1 - float(share), shared)
+    return AxesDuel(F, effect, sigma, z, False, 1 - float(share), shared)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pelorus.calibrated import last_calibrated
 from pelorus.frames import Config, Header, Message, Text
-from pelorus.report.page import Table
+from pelorus.report.page import PageTable
 from pelorus.report.words import NONE
 from pelorus.schema import DEFAULTS
 from pelorus.settings import describe
@@ -19,12 +19,12 @@ from pelorus.settings import describe
 SEVERITIES = ("", "warning", "error")
 
 
-def tables_of(messages: Sequence[Message]) -> list[Table]:
+def tables_of(messages: Sequence[Message]) -> list[PageTable]:
     """Returns the tables, folded, for readers who look for them."""
     return [*_settings(messages), *_calibration(messages), *_remarks(messages)]
 
 
-def _settings(messages: Sequence[Message]) -> Iterator[Table]:
+def _settings(messages: Sequence[Message]) -> Iterator[PageTable]:
     """Yields the settings; those that differ from the defaults first."""
     configs = [m for m in messages if isinstance(m, Config) and m.build_fingerprint]
     if not configs:
@@ -39,10 +39,10 @@ def _settings(messages: Sequence[Message]) -> Iterator[Table]:
     changed = sum(not row[0] for row in rows)
     cells = [(row[1], row[2], row[3] if not row[0] else "") for row in rows]
     title = f"Settings in force: {changed} of {len(rows)} differ from the defaults"
-    yield Table(title, [("setting", "value", "default"), *cells], folded=True)
+    yield PageTable(title, [("setting", "value", "default"), *cells], folded=True)
 
 
-def _calibration(messages: Sequence[Message]) -> Iterator[Table]:
+def _calibration(messages: Sequence[Message]) -> Iterator[PageTable]:
     header = next((m for m in messages if isinstance(m, Header)), None)
     if header is None:
         return
@@ -65,7 +65,7 @@ def _calibration(messages: Sequence[Message]) -> Iterator[Table]:
     ]
     estimated = f"{len(told)} numbers estimated" if told else "as given, nothing is estimated"
     head = ("", "given", "estimated correction")
-    yield Table(f"Calibration: {estimated}", [head, *rows], folded=True)
+    yield PageTable(f"Calibration: {estimated}", [head, *rows], folded=True)
 
 
 def _told(told: dict[str, tuple[float, float, str]], *keys: str) -> str:
@@ -73,10 +73,10 @@ def _told(told: dict[str, tuple[float, float, str]], *keys: str) -> str:
     return ", ".join(f"{value:+.3g} ± {sigma:.2g} {unit}" for value, sigma, unit in parts) or NONE
 
 
-def _remarks(messages: Sequence[Message]) -> Iterator[Table]:
+def _remarks(messages: Sequence[Message]) -> Iterator[PageTable]:
     texts = [m for m in messages if isinstance(m, Text)]
     if texts:
         rows = [(SEVERITIES[min(m.severity, 2)], m.text) for m in texts]
-        yield Table(
+        yield PageTable(
             f"What the recording says: {len(texts)} remarks", [("", "remark"), *rows], folded=True
         )

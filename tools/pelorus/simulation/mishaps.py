@@ -161,7 +161,7 @@ class Mishaps:
 NO_MISHAPS = Mishaps()
 
 
-class Drift:
+class TrackDrift:
     """Drift of each track: a random walk, alike in both images."""
 
     def __init__(self, count: int, sigma: float, chance: np.random.Generator) -> None:
