@@ -43,7 +43,7 @@ class Known:
         """Why this fault is none that the drive could tell; empty if it could. What the clean
         drive itself is off by counts, too: it may make up for the fault.
         """
-        if not self.agreed.told:
+        if not self.agreed.is_known:
             return "too few frames"
         of_others = {"moving": _moves, "mirrored": _turns, "axes": _turns, "lever": self._lever}
         if name in of_others:

@@ -89,7 +89,7 @@ def test_the_first_cause_of_an_event_is_named_with_its_time(
     assert changed is not None
     found = explained(changed, tmp_path).first
     assert found is not None
-    assert found.cause in event.told
+    assert found.cause in event.causes
     assert abs(found.from_ns - t) <= WITHIN_S * S
 
 

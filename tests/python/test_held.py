@@ -192,7 +192,7 @@ def test_priors_of_biases_that_allow_what_drifting_tracks_tell_stay(
     for frames, expected in ((200, given | changed), (199, given)):
         examined = SimpleNamespace(frame_t_ns=np.arange(frames) * 100_000_000)
         bench = SimpleNamespace(examined=examined, header=header())
-        settings, _ = biases.told_in_drift(cast(Any, bench), given, {})
+        settings, _ = biases.gyro_bias_in_drift(cast(Any, bench), given, {})
         assert settings == expected
 
 
@@ -206,10 +206,10 @@ def test_a_bias_that_a_bent_picture_may_be_is_not_switched_on(
     bench = SimpleNamespace(examined=examined, header=header())
     turns_px = 0.002 * header().camera.fx_px * 0.1
     off = {"bias": "off"}
-    bent, words = biases.told_in_drift(cast(Any, bench), off, {}, 1.1 * turns_px)
+    bent, words = biases.gyro_bias_in_drift(cast(Any, bench), off, {}, 1.1 * turns_px)
     assert bent == off
     assert "rectification" in words
-    flat, _ = biases.told_in_drift(cast(Any, bench), off, {}, 0.9 * turns_px)
+    flat, _ = biases.gyro_bias_in_drift(cast(Any, bench), off, {}, 0.9 * turns_px)
     assert flat["bias"] == "on"
 
 

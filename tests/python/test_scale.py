@@ -83,7 +83,7 @@ def test_two_clocks_are_no_timing(monkeypatch: pytest.MonkeyPatch, one_clock: bo
     monkeypatch.setattr(tuning, "search_noises", lambda *_: found)
     monkeypatch.setattr(tuning, "track_noise", lambda _: SimpleNamespace(drifts=False))
     monkeypatch.setattr(tuning, "difference_of_a_reading", lambda *_: None)
-    monkeypatch.setattr(tuning, "told_by_halves", lambda _, fixed, __: (fixed, "no bias"))
+    monkeypatch.setattr(tuning, "biases_by_halves", lambda _, fixed, __: (fixed, "no bias"))
     monkeypatch.setattr(tuning, "_axes", lambda *_: (found, "one sigma for all axes"))
     bench = SimpleNamespace(
         by_imu=False,

@@ -119,7 +119,7 @@ def tried(program: Path, drive: Drive, event: Event, own: Explanation) -> Tried 
     if not told:
         return Tried(event.name, drive.name, False, f"{when}: nothing was told")
     off_s = (told[0].from_ns - t) / S
-    right = told[0].cause in event.told and abs(off_s) <= WITHIN_S
+    right = told[0].cause in event.causes and abs(off_s) <= WITHIN_S
     words = f"{when}: {told[0].cause} {off_s:+.2f} s: {told[0].words}"
     return Tried(event.name, drive.name, right, words)
 

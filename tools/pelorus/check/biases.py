@@ -35,7 +35,7 @@ class CommonBias(NamedTuple):
     known: float
 
 
-def told_by_halves(
+def biases_by_halves(
     bench: Bench, fixed: Settings, values: Mapping[str, float]
 ) -> tuple[dict[str, str], str]:
     """Returns the settings with bias priors, and what was found in words.
@@ -63,7 +63,7 @@ def told_by_halves(
     )
 
 
-def told_in_drift(
+def gyro_bias_in_drift(
     bench: Bench, fixed: Settings, values: Mapping[str, float], shared_px: float = 0.0
 ) -> tuple[dict[str, str], str]:
     """Returns the settings with a gyro bias prior for tracks that drift, and what was found in

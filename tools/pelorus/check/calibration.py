@@ -46,6 +46,6 @@ def calibration(
     `agreed` returns how far images and twists agree beside a velocity bias of a given sigma, m/s.
     """
     found = agreed(max(bias_of(messages), NO_BIAS_MPS))
-    if found is None or not found.told:
+    if found is None or not found.is_known:
         return CalibrationDoubts()
     return CalibrationDoubts(doubted(found, messages), turned(found, messages))

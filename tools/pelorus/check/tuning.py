@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pelorus.check import clock, scale, tuning_imu
-from pelorus.check.biases import WIDE, told_by_halves, told_in_drift
+from pelorus.check.biases import WIDE, biases_by_halves, gyro_bias_in_drift
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, SCALE, Bench
 from pelorus.check.parameters import (
@@ -30,7 +30,7 @@ from pelorus.check.parameters import (
     written,
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
-from pelorus.check.tracks_noise import DRIFT, TrackNoise, told_apart, track_noise
+from pelorus.check.tracks_noise import DRIFT, TrackNoise, differs_clearly, track_noise
 from pelorus.converters.twist_noise import TwistSpread, difference_of_a_reading
 
 SPREAD_FRAMES = 20  # enough to measure a spread to a fifth, as a start
@@ -59,7 +59,7 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
         fixed.pop(DRIFT, None)  # the biases that one step shows are estimated without drift
         found = _of_drifting_tracks(bench, fixed, start, noise)
         shared_px = noise.rows.shared_px if noise.rows is not None else 0.0
-        fixed, words = told_in_drift(bench, fixed, found.values, shared_px)
+        fixed, words = gyro_bias_in_drift(bench, fixed, found.values, shared_px)
         offset_s = float(fixed.pop(OFFSET))
         fixed |= noise.setting(given)
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
@@ -72,7 +72,7 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
         values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, values, TWIST, COARSE).values
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
-    fixed, of_bias = told_by_halves(bench, moved, values)
+    fixed, of_bias = biases_by_halves(bench, moved, values)
     off = scale.off_by(bench, moved | written(values, TWIST))
     if one_clock:
         fixed, found, of_clock = clocked(bench, fixed, values, given, off)
@@ -118,12 +118,12 @@ def _of_drifting_tracks(
     tracks.
     """
     values = dict(start)
-    if told_apart(noise.stands_for_px, start["pixel"]):
+    if differs_clearly(noise.stands_for_px, start["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     most = difference_of_a_reading(bench.examined)
     if most is not None:
         for name, value in _of_twists(start, most).items():
-            if value < start[name] and told_apart(value, start[name]):
+            if value < start[name] and differs_clearly(value, start[name]):
                 values[name] = value
     return BestFound(values, bench.run({**fixed, **written(values, TWIST)}))
 

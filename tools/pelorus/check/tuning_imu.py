@@ -31,7 +31,7 @@ from pelorus.check.parameters import (
     written,
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
-from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
+from pelorus.check.tracks_noise import TrackNoise, differs_clearly, track_noise
 from pelorus.inertial_survey import scatter
 
 LOOSE = 10.0  # factor of the noises while the clock is far off
@@ -255,7 +255,7 @@ def _of_drifting_tracks(
     tracks.
     """
     values = dict(values)
-    if told_apart(noise.stands_for_px, values["pixel"]):
+    if differs_clearly(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     settings = {**side, **noise.setting(side), **written(values, PIXEL | IMU | WALKS)}
     offset = clock.of_imu(bench, settings | fewer_slots(settings), float(side[OFFSET]))

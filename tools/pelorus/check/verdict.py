@@ -22,7 +22,7 @@ from pelorus.check.known import Known, known_of
 from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned
 from pelorus.check.scale import Doubt
-from pelorus.check.tracks_noise import DRIFT, told_apart
+from pelorus.check.tracks_noise import DRIFT, differs_clearly
 from pelorus.evaluation import judge
 from pelorus.faults.mend import BEHIND, CANNOT, known_words
 from pelorus.frame_table import BIASES, FrameTable, frame_table
@@ -207,7 +207,7 @@ def verdict_of_log(messages: Sequence[Message]) -> Verdict:
 
 def verdict_of(run: JudgedRun | None, known: Known) -> Verdict:
     """Judges a run. It is not examined where a fault of the recording must be mended first."""
-    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.told) for f in known.faults]
+    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.sentence) for f in known.faults]
     agreed = known.judged.agreed
     if known.is_stopped or run is None:
         told = BEHIND if agreed is None else f"{known_words(agreed)}; {CANNOT}"
@@ -408,7 +408,11 @@ def _for_tracks(run: JudgedRun, known: Known) -> dict[str, str]:
     told = noise.setting({DRIFT: was, "model": _model(run)})
     told = {} if told.get(DRIFT) == was else told
     pixel_px = in_force(run.messages, PIXEL)
-    if pixel_px and noise.stands_for_px > pixel_px and told_apart(noise.stands_for_px, pixel_px):
+    if (
+        pixel_px
+        and noise.stands_for_px > pixel_px
+        and differs_clearly(noise.stands_for_px, pixel_px)
+    ):
         told[PIXEL] = f"{noise.stands_for_px:.3g}"
     return told
 

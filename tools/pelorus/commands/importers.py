@@ -311,6 +311,6 @@ def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | No
 
 def converted(found: Streams, timing: TwistTiming | None, fix: bool, target: Path) -> None:
     """Prints the remarks, makes the recording, and writes it."""
-    for remark in found.told:
+    for remark in found.all_remarks:
         out.print(escape(remark))
     write(*streams.converted(found, timing, fix), target)

@@ -184,7 +184,7 @@ def _json(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) 
         "recording": str(compared.subject.path),
         **verdict.json(),
         "remarks": lines,
-        "health": compared.main.health.told(compared.origin_ns),
+        "health": compared.main.health.lines(compared.origin_ns),
         "runs": {run.name: run.summary for run in compared.runs},
     }
 
@@ -201,7 +201,7 @@ def _tell(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) 
     out.print(table)
     for line in lines:
         out.print(f"[yellow]-[/] {escape(line)}")
-    summary, *spells = compared.main.health.told(compared.origin_ns)
+    summary, *spells = compared.main.health.lines(compared.origin_ns)
     out.print(f"health: {summary}")
     for spell in spells:
         out.print(f"  {escape(spell)}")

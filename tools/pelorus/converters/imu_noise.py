@@ -41,7 +41,7 @@ def compare(recording: Recording, truth: TrueMotion) -> Finding:
     truth = truth.at(slice(int(first), int(last)))
     before, after = truth.at(slice(None, -1)), truth.at(slice(1, None))
     if not len(after.t_ns):
-        return Finding("noise of the readings", False, "no two true poses", "", told=False)
+        return Finding("noise of the readings", False, "no two true poses", "", is_conclusive=False)
     start = MotionState(before.R, before.p, before.v_B)
     ends = inertial.coasted(
         _without_bias(readings, truth), before.t_ns, after.t_ns, start, noise.gravity

@@ -136,7 +136,7 @@ def _alone(bag: Bag, topics: MotionTopics, asked: Asked, remarks: list[str]) -> 
         return _twists(bag, bag.require(topics.twist or twists[0], *TWISTS), asked, remarks)
     if not twists and len(imus) == 1:
         return _imu(bag, imus[0], topics.gyro, remarks)
-    pair = _apart(bag, imus, remarks) if not twists and len(imus) == 2 else None
+    pair = _separate_imu_topics(bag, imus, remarks) if not twists and len(imus) == 2 else None
     if pair is not None:
         return pair
     raise PelorusError(
@@ -229,7 +229,7 @@ def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
     )
 
 
-def _apart(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
+def _separate_imu_topics(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
     """Joins the topics of an accelerometer and a gyro; None if the topics are not these."""
     pair = [_halves(bag, topic, []) for topic in topics]
     forces = [bool(rows.numbers[:, :3].any()) for rows in pair]

@@ -138,7 +138,7 @@ class Streams:
     settings: dict[str, float] = field(default_factory=dict)
 
     @property
-    def told(self) -> list[str]:
+    def all_remarks(self) -> list[str]:
         """Returns what the user should know of how the files were read."""
         of_truth = self.truth.remarks if self.truth else ()
         return [*self.remarks, *of_truth, *self.calibrated.remarks]
@@ -215,7 +215,7 @@ def converted(
 
 
 def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
-    remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.told]
+    remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.all_remarks]
     motion = streams.motion
     if isinstance(motion, Twists):
         in_frame = max(_interval_s(t_ns) / _interval_s(motion.t_ns), 1.0)

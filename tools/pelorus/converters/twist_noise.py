@@ -51,7 +51,7 @@ def suggest(recording: Recording) -> tuple[Recording, Finding]:
     if usable.sum() < FRAMES_ENOUGH:
         evidence = f"{int(usable.sum())} frames with tracks enough, {FRAMES_ENOUGH} are expected"
         action = "no suggestion: give the sigmas"
-        return recording, Finding(subject, False, evidence, action, told=False)
+        return recording, Finding(subject, False, evidence, action, is_conclusive=False)
     tau_s = np.diff(recording.frame_t_ns)[usable] * 1e-9
     halves = [visual_motion.estimate(half, camera) for half in _halves(seen)]
     images = _spread(_body(recording, halves[0]), _body(recording, halves[1]), usable, tau_s, 0.5)

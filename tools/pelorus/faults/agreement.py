@@ -54,7 +54,7 @@ class Agreement:
     clocks: TwoClocks = UNTOLD  # of velocities and of turns separately; none for an IMU
 
     @property
-    def told(self) -> bool:
+    def is_known(self) -> bool:
         return self.frames >= FRAMES_MIN
 
 
@@ -92,7 +92,7 @@ def agreement(recording: Recording, views: TwoViews, seen: CameraMotion | None =
     if found is None:
         found = Fit(body.design(recording, seen, at, bias))
     none = place = found
-    turns_told = by_imu or found.tells(TURN_SCALE)
+    turns_known = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
         late = clocks.turns_late_s if clocks.apart else None
         place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
@@ -117,7 +117,7 @@ def agreement(recording: Recording, views: TwoViews, seen: CameraMotion | None =
         clock_sigma,
         speed,
         1 + float(found.x[TURN_SCALE]),
-        found.known(TURN_SCALE) if turns_told else float("inf"),
+        found.known(TURN_SCALE) if turns_known else float("inf"),
         1 - float(found.x[FOCAL]),
         found.known(FOCAL) if by_imu else float("inf"),
         tilt_rad=tilt[0],

@@ -88,7 +88,7 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     if wrong:  # moving objects explain it
         return Judged(moves or wrong)
     agreed = ask()
-    if not agreed.told:
+    if not agreed.is_known:
         return Judged(moves)
     faults = moves
     if not moves:  # moving objects look like another scale or place of the camera
@@ -107,7 +107,7 @@ def _of_twists(
 ) -> Iterator[Fault]:
     """Yields faults of units, axes and the extrinsic's rotation, by twists."""
     found = hand_eye(recording, views)
-    if not found.told:
+    if not found.is_known:
         yield _untold(found.frames)
         return
     if not (recording.v_B_mps.any() or recording.w_B_radps.any()):
@@ -251,7 +251,7 @@ def _units(found: HandEye) -> Iterator[Fault]:
         ("km/h", ways, 3.6, "velocities: m/s were made of km/h twice"),
     ):
         near = UNIT_NEAR + (0.3 if abs(np.log(unit)) > np.log(10) else 0)
-        if name == "degrees" and not found.turns_told:
+        if name == "degrees" and not found.turns_are_known:
             continue
         if scale > 0 and abs(np.log(scale / unit)) < near:
             shown = f"the images show {scale:.3g} times the {words}"
@@ -268,7 +268,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
     off = angle_between(found.R, given)
     sigmas = off / _sigma_deg(found, given)
     sure = sigmas > SURE_SIGMAS
-    rolled = off > ROLLED_DEG and found.turns_told
+    rolled = off > ROLLED_DEG and found.turns_are_known
     axes = list(_axes(recording, views))
     cosine = float((found.R @ found.heading_B) @ (given @ found.heading_B))
     headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))

@@ -209,10 +209,12 @@ def _turn(
 def _are_silent(y: Floats, w: Floats, beside: Floats) -> bool:
     """Returns whether the readings are unrelated to what the images show."""
     seen_to_turn = _together(y, beside)
-    return seen_to_turn > max(TURNS_SIGMAS, PART_LEAST * _together(w, _foretold(w, _told(beside))))
+    return seen_to_turn > max(
+        TURNS_SIGMAS, PART_LEAST * _together(w, _predicted(w, _with_bias(beside)))
+    )
 
 
-def _told(own: Floats) -> Floats:
+def _with_bias(own: Floats) -> Floats:
     """Returns the rates with a column for the bias."""
     return np.hstack((own, np.ones((len(own), 1))))
 
@@ -223,7 +225,7 @@ def _rows(
     """Returns y, X, Z, the variance and the frames. Unrelated readings count as 0."""
     instruments = np.hstack([other.rates[:, 3:] for other in others])
     at = np.flatnonzero(own.usable & np.isfinite(np.hstack((w, instruments))).all(axis=1))
-    w, told = w[at], _told(_within(instruments[at]))
+    w, told = w[at], _with_bias(_within(instruments[at]))
     expected = w if silent else told @ np.linalg.lstsq(told, w, rcond=None)[0]
     return own.rates[at, 3:], _columns(w), _columns(expected), own.variance[at, 3:], at
 
@@ -242,7 +244,7 @@ def _columns(w: Floats) -> Floats:
     return X
 
 
-def _foretold(w: Floats, told: Floats) -> Floats:
+def _predicted(w: Floats, told: Floats) -> Floats:
     """Returns the rates as predicted by a fit in the other half of the drive."""
     half = len(w) // 2
     first, second = (np.linalg.lstsq(told[k], w[k], rcond=None)[0] for k in

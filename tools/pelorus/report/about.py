@@ -47,29 +47,37 @@ def _calibration(messages: Sequence[Message]) -> Iterator[PageTable]:
     if header is None:
         return
     found = last_calibrated(messages)
-    told = {} if found is None else {part.key: (v, s, part.unit) for part, v, s in found.parts()}
+    estimates = (
+        {} if found is None else {part.key: (v, s, part.unit) for part, v, s in found.parts()}
+    )
     camera = header.camera
     place = "  ".join(f"{x:+.4f}" for x in np.asarray(header.t_CB_m))
     turn = " / ".join(" ".join(f"{x:+.4f}" for x in row) for row in np.asarray(header.R_CB))
     rows = [
-        ("focal lengths", f"{camera.fx_px:g}, {camera.fy_px:g} px", _told(told, "focal")),
+        (
+            "focal lengths",
+            f"{camera.fx_px:g}, {camera.fy_px:g} px",
+            _estimate_words(estimates, "focal"),
+        ),
         (
             "principal point",
             f"{camera.cx_px:g}, {camera.cy_px:g} px",
-            _told(told, "centre_u", "centre_v"),
+            _estimate_words(estimates, "centre_u", "centre_v"),
         ),
-        ("baseline", f"{camera.baseline_m:g} m", _told(told, "baseline")),
-        ("R_CB", turn, _told(told, "turn_x", "turn_y", "turn_z")),
-        ("t_CB", f"{place} m", _told(told, "place_x", "place_y", "place_z")),
-        ("camera's clock", "0", _told(told, "clock")),
+        ("baseline", f"{camera.baseline_m:g} m", _estimate_words(estimates, "baseline")),
+        ("R_CB", turn, _estimate_words(estimates, "turn_x", "turn_y", "turn_z")),
+        ("t_CB", f"{place} m", _estimate_words(estimates, "place_x", "place_y", "place_z")),
+        ("camera's clock", "0", _estimate_words(estimates, "clock")),
     ]
-    estimated = f"{len(told)} numbers estimated" if told else "as given, nothing is estimated"
+    estimated = (
+        f"{len(estimates)} numbers estimated" if estimates else "as given, nothing is estimated"
+    )
     head = ("", "given", "estimated correction")
     yield PageTable(f"Calibration: {estimated}", [head, *rows], folded=True)
 
 
-def _told(told: dict[str, tuple[float, float, str]], *keys: str) -> str:
-    parts = [told[key] for key in keys if key in told]
+def _estimate_words(estimates: dict[str, tuple[float, float, str]], *keys: str) -> str:
+    parts = [estimates[key] for key in keys if key in estimates]
     return ", ".join(f"{value:+.3g} ± {sigma:.2g} {unit}" for value, sigma, unit in parts) or NONE
 
 

@@ -130,7 +130,7 @@ def of_comparison(
         tables=[PageTable("Runs", rows, meaning), *tables],
         pictures=pictures,
         commands=commands,
-        lists=[("Health", compared.main.health.told(compared.origin_ns))],
+        lists=[("Health", compared.main.health.lines(compared.origin_ns))],
     )
 
 
