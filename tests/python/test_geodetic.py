@@ -204,7 +204,7 @@ def test_the_heading_at_the_start_is_found_by_the_way_and_the_filter_takes_posit
 ) -> None:
     drive, truth = on_earth(clean(seed=5, duration_s=40.0), yaw, 0.4, F)
     made, finding = earth_start.started(replace(drive, truth_t_ns=drive.truth_t_ns[:0]))
-    assert finding.told
+    assert finding.is_conclusive
     assert made.start is not None
     off = truth.R[0].T @ made.start.R_WB
     assert np.linalg.norm(Rotation.from_matrix(off).as_rotvec()) < 0.1
@@ -219,5 +219,5 @@ def test_a_heading_that_the_way_does_not_tell_is_said() -> None:
     drive, _ = on_earth(clean(**SHORT), 1.0, 50.0, np.eye(3))
     made, finding = earth_start.started(drive)
     assert made.start is None
-    assert not finding.told
+    assert not finding.is_conclusive
     assert "the way is too short: it is known to" in finding.evidence

@@ -25,7 +25,7 @@ from pelorus.layout import unpack_symmetric
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.report.packed import Packer
-from pelorus.report.page import Answer, Table
+from pelorus.report.page import Answer, PageTable
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
@@ -440,7 +440,12 @@ def test_tables_are_whole_on_a_phone(browser: Tab, tmp_path: Path) -> None:
     rows = [[f"column {k} m" for k in range(9)], *([f"{row}.1234"] * 9 for row in range(3))]
     page.write(
         path,
-        Answer("t", "good", "", tables=[Table("few", [r[:5] for r in rows]), Table("many", rows)]),
+        Answer(
+            "t",
+            "good",
+            "",
+            tables=[PageTable("few", [r[:5] for r in rows]), PageTable("many", rows)],
+        ),
     )
     browser.open(path, 390)
     widths = "[...document.querySelectorAll('.wide')].map((w) => w.scrollWidth - w.clientWidth)"

@@ -97,7 +97,7 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
         found.calibrated.header, camera=Camera(*five), R_CB=R, t_CB_m=np.asarray(camera.t_CB_m),
         image_width_px=rig.left.width_px, image_height_px=rig.left.height_px,
     )  # fmt: skip
-    of_tracks = replace(found, frames=streams.Seen(Path(), t_ns, tracks))
+    of_tracks = replace(found, frames=streams.RawTracks(Path(), t_ns, tracks))
     made = streams._with_motion(header, of_tracks, t_ns, tracks)
     assert found.truth is not None
     truth = streams._at_frames(found.truth, t_ns, found.motion)

@@ -27,12 +27,12 @@ DATA = (*MOTION, Kind.STEREO, Kind.TRUTH, Kind.READING)
 class Event(NamedTuple):
     """An event to inject.
 
-    `told` are the names of right causes; `wheels`: whether it needs twists; `settings` are for the
+    `causes` are the names of right ones; `wheels`: whether it needs twists; `settings` are for the
     replay.
     """
 
     name: str
-    told: tuple[str, ...]
+    causes: tuple[str, ...]
     into: Callable[[Messages, int, Chance], Messages | None]
     wheels: bool | None = None  # twists alone, an IMU alone, either
     settings: tuple[tuple[str, ...], ...] = ()

@@ -14,7 +14,7 @@ from pelorus.frames import Camera, Kind, Message, identity, zeros
 from pelorus.layout import Floats
 
 
-class Part(NamedTuple):
+class CalibrationPart(NamedTuple):
     """One number of the calibration, in the order of the message."""
 
     key: str
@@ -24,15 +24,18 @@ class Part(NamedTuple):
 
 
 PARTS = (
-    Part("baseline", "baseline", "%", 100),
-    Part("focal", "focal length", "%", 100),
+    CalibrationPart("baseline", "baseline", "%", 100),
+    CalibrationPart("focal", "focal length", "%", 100),
     *(
-        Part(f"turn_{axis}", f"turn of the camera about its {axis}", "deg", 180 / np.pi)
+        CalibrationPart(f"turn_{axis}", f"turn of the camera about its {axis}", "deg", 180 / np.pi)
         for axis in "xyz"
     ),
-    *(Part(f"centre_{axis}", f"principal point {axis}", "px", 1) for axis in "uv"),
-    *(Part(f"place_{axis}", f"place of the camera along its {axis}", "mm", 1000) for axis in "xyz"),
-    Part("clock", "camera's clock", "ms", 1000),
+    *(CalibrationPart(f"centre_{axis}", f"principal point {axis}", "px", 1) for axis in "uv"),
+    *(
+        CalibrationPart(f"place_{axis}", f"place of the camera along its {axis}", "mm", 1000)
+        for axis in "xyz"
+    ),
+    CalibrationPart("clock", "camera's clock", "ms", 1000),
 )
 MEANING = {
     f"calibrated_{part.key}{end}": f"{what} of the {part.name}, {part.unit}"
@@ -63,7 +66,7 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
         camera = Camera(**{part.name: values.pop(part.name) for part in fields(Camera)})
         return cls(camera=camera, **values)
 
-    def parts(self) -> Iterator[tuple[Part, float, float]]:
+    def parts(self) -> Iterator[tuple[CalibrationPart, float, float]]:
         """Yields each estimated part with its correction and its remaining sigma, in the part's
         unit.
         """

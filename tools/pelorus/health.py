@@ -106,7 +106,7 @@ class TimeLine:
         start = f", after {waited} frames before the start" if waited else ""
         return ", ".join((f"good in {good} of {self.frames} frames", *others)) + start
 
-    def told(self, origin_ns: int) -> list[str]:
+    def lines(self, origin_ns: int) -> list[str]:
         """Returns the summary, and each spell."""
         return [self.summary(), *(spell.words(origin_ns) for spell in self.spells)]
 

@@ -50,7 +50,7 @@ class Inertial(NamedTuple):
 NO_READINGS = Inertial(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)))
 
 
-class Moving(NamedTuple):
+class MotionState(NamedTuple):
     """Poses and velocities of bodies: R (..., 3, 3), p in the world, v in body axes."""
 
     R: Floats
@@ -58,7 +58,7 @@ class Moving(NamedTuple):
     v_B: Floats
 
 
-def step(state: Moving, tau_s: Floats, a: Floats, w: Floats, g_W: Floats) -> Moving:
+def step(state: MotionState, tau_s: Floats, a: Floats, w: Floats, g_W: Floats) -> MotionState:
     """Moves every state (...) by its own tau, with constant a and w."""
     tau = tau_s[..., None]
     turn = tau * w
@@ -72,7 +72,7 @@ def step(state: Moving, tau_s: Floats, a: Floats, w: Floats, g_W: Floats) -> Mov
     down = _times(np.swapaxes(state.R, -1, -2), g_W)
     moved = tau * state.v_B + tau * tau * (0.5 * down + _times(G2, a))
     v_B = _times(np.swapaxes(E, -1, -2), state.v_B + tau * (down + _times(G1, a)))
-    return Moving(state.R @ E, state.p + _times(state.R, moved), v_B)
+    return MotionState(state.R @ E, state.p + _times(state.R, moved), v_B)
 
 
 def _times(M: Floats, x: Floats) -> Floats:
@@ -92,8 +92,8 @@ def series(s: Floats, order: int, terms: int) -> Floats:
 
 
 def coasted(
-    readings: Inertial, from_ns: Times, until_ns: Times, first: Moving, gravity: float
-) -> Moving:
+    readings: Inertial, from_ns: Times, until_ns: Times, first: MotionState, gravity: float
+) -> MotionState:
     """Moves many states in parallel: from `first` (n) at `from_ns` (n) to `until_ns`.
 
     Each interval has the mean of the readings at both ends; where a stretch cuts one, they are
@@ -115,7 +115,7 @@ def coasted(
     return state
 
 
-def path(readings: Inertial, first: Moving, gravity: float) -> Moving:
+def path(readings: Inertial, first: MotionState, gravity: float) -> MotionState:
     """Returns the states (n) at the times of the readings, beginning with `first`."""
     g_W = np.array([0.0, 0.0, -gravity])
     tau: Floats = np.diff(readings.t_ns) * 1e-9
@@ -124,7 +124,7 @@ def path(readings: Inertial, first: Moving, gravity: float) -> Moving:
     states = [first]
     for k in range(len(tau)):
         states.append(step(states[-1], tau[k], a[k], w[k], g_W))
-    return Moving(*(np.array(part) for part in zip(*states, strict=True)))
+    return MotionState(*(np.array(part) for part in zip(*states, strict=True)))
 
 
 def messages(

@@ -31,7 +31,7 @@ FRAME_MIN_DEG = 10.0  # between axes of another frame; less is an error of a mou
 UNEXPLAINED_MAX = 0.25  # share of the positions' variance, where they fit at all
 
 
-class Named(NamedTuple):
+class NamedPoses(NamedTuple):
     """Poses, and the name of their file."""
 
     name: str
@@ -52,7 +52,7 @@ def times_apart(a: tuple[str, Times], b: tuple[str, Times]) -> str:
     return f"most are within {near_s:.2g} s: --tolerance {1.1 * near_s:.2g} would take them"
 
 
-class Fit(NamedTuple):
+class SimilarityFit(NamedTuple):
     """How well b's positions, moved, turned and scaled, fit a's."""
 
     scale: float
@@ -61,7 +61,7 @@ class Fit(NamedTuple):
     unexplained: float  # share of a's variance, with the scale
 
 
-def doubts(a: Named, b: Named, fixed: bool) -> list[str]:
+def doubts(a: NamedPoses, b: NamedPoses, fixed: bool) -> list[str]:
     """Returns questions about poses of the same times; `fixed`: a was certainly read right."""
     if len(a.poses.p) < POSES_MIN:
         return []
@@ -74,7 +74,7 @@ def doubts(a: Named, b: Named, fixed: bool) -> list[str]:
     return [*_scale(found, a, b), *_turned(found, a, b, fixed)]
 
 
-def fit(a: Floats, b: Floats) -> Fit | None:
+def fit(a: Floats, b: Floats) -> SimilarityFit | None:
     """Fits a = s R b + t by least squares (Umeyama 1991); None where one of them does not move."""
     from_a, from_b = a - a.mean(axis=0), b - b.mean(axis=0)
     moved_a, moved_b = rms(from_a), rms(from_b)
@@ -83,10 +83,10 @@ def fit(a: Floats, b: Floats) -> Fit | None:
     turned = from_b @ se3.nearest_rotation(from_a.T @ from_b).T
     scale = float((turned * from_a).sum() / (turned * turned).sum())
     scaled_m, plain_m = rms(from_a - scale * turned), rms(from_a - turned)
-    return Fit(scale, scaled_m, plain_m, (scaled_m / moved_a) ** 2)
+    return SimilarityFit(scale, scaled_m, plain_m, (scaled_m / moved_a) ** 2)
 
 
-def _scale(found: Fit, a: Named, b: Named) -> list[str]:
+def _scale(found: SimilarityFit, a: NamedPoses, b: NamedPoses) -> list[str]:
     larger = max(found.scale, 1 / found.scale)
     if larger < SCALE_MIN or found.plain_m < BETTER * found.scaled_m:
         return []
@@ -105,7 +105,7 @@ def _scale(found: Fit, a: Named, b: Named) -> list[str]:
 # --- rotations ------------------------------------------------------------------------------------
 
 
-def _turned(found: Fit, a: Named, b: Named, fixed: bool) -> list[str]:
+def _turned(found: SimilarityFit, a: NamedPoses, b: NamedPoses, fixed: bool) -> list[str]:
     as_read = _apart_deg(a.poses.R, b.poses.R)
     sides = [(a, b)] if fixed else [(a, b), (b, a)]
     best_deg, best = as_read / BETTER, ""
@@ -148,7 +148,7 @@ def _apart_deg(R_a: Floats, R_b: Floats) -> float:
     return float(np.degrees(rms(Rotation.from_matrix(between).as_rotvec())))
 
 
-def _other_frame(a: Named, b: Named) -> tuple[float, float, str]:
+def _other_frame(a: NamedPoses, b: NamedPoses) -> tuple[float, float, str]:
     """Tests whether poses are those of another frame on the same body.
 
     Returns the angle between the axes, the remaining difference, in degrees, and what to ask.
@@ -166,7 +166,7 @@ def _other_frame(a: Named, b: Named) -> tuple[float, float, str]:
     )
 
 
-def _inverse(a: Named, b: Named, as_read: Fit) -> list[str]:
+def _inverse(a: NamedPoses, b: NamedPoses, as_read: SimilarityFit) -> list[str]:
     """Returns a question where the positions of the inverse transforms fit better."""
     found = fit(a.poses.p, se3.inverse(b.poses).p)
     if found is None or found.unexplained > min(UNEXPLAINED_MAX, as_read.unexplained / BETTER**2):

@@ -19,11 +19,11 @@ class Struct(c.Structure):
 
     def __repr__(self) -> str:
         names = (field[0] for field in self._fields_)
-        told = (f"{name}={_told(name, getattr(self, name))}" for name in names)
-        return f"{type(self).__name__}({', '.join(told)})"
+        members = (f"{name}={_member_words(name, getattr(self, name))}" for name in names)
+        return f"{type(self).__name__}({', '.join(members)})"
 
 
-def _told(name: str, value: Any) -> str:
+def _member_words(name: str, value: Any) -> str:
     """Returns a member as in a struct's repr."""
     if name == "health":
         return schema.HEALTHS.get(value, str(value))

@@ -57,7 +57,7 @@ class Stream:
 
 
 @dataclass(frozen=True)
-class Tracks:
+class TrackSurvey:
     """Observations of all STEREO frames."""
 
     observations: int
@@ -68,7 +68,7 @@ class Tracks:
 
 
 @dataclass(frozen=True)
-class SmallSensor:
+class SensorSurvey:
     """The READINGs of one sensor."""
 
     stream: Stream
@@ -87,10 +87,10 @@ class Survey:
     landmarks: dict[str, int]  # by role
     texts: list[Text]
     streams: dict[Kind, Stream]
-    sensors: dict[str, SmallSensor]
+    sensors: dict[str, SensorSurvey]
     calibrated: Calibrated | None  # a filter's last estimate
     imu: ImuSurvey | None
-    tracks: Tracks | None
+    tracks: TrackSurvey | None
     end: End | None
     health: TimeLine | None = None  # of a result
     remarks: list[str] = field(default_factory=list)
@@ -141,14 +141,14 @@ def survey(path: Path) -> Survey:
     return found
 
 
-def _sensors(readings: list[Reading]) -> dict[str, SmallSensor]:
+def _sensors(readings: list[Reading]) -> dict[str, SensorSurvey]:
     """Returns the sensors by name, in the order of their numbers."""
     found = {}
     for number in sorted({m.sensor for m in readings}):
         own = [m for m in readings if m.sensor == number]
         has = np.array([[m.axes >> k & 1 for k in range(3)] for m in own], bool)
         sigma = np.array([m.sigma for m in own])
-        found[name_of(number)] = SmallSensor(
+        found[name_of(number)] = SensorSurvey(
             _stream(_times(own), ties=True),
             int(np.bitwise_or.reduce([m.axes for m in own])),
             tuple(float(np.median(sigma[has[:, k], k])) for k in range(3) if has[:, k].any()),
@@ -181,14 +181,14 @@ def _stream(exact: Sequence[int], ties: bool = False) -> Stream:
     )
 
 
-def _tracks(stereos: list[Stereo]) -> Tracks:
+def _tracks(stereos: list[Stereo]) -> TrackSurvey:
     per_frame = np.array([len(m.ids) for m in stereos])
     ids = np.concatenate([m.ids for m in stereos])
     pixels = np.concatenate([m.pixels for m in stereos])
     _, seen = np.unique(ids, return_counts=True)
     with np.errstate(invalid="ignore"):
         no_disparity = int(np.sum(~(pixels[:, 0] > pixels[:, 2])))
-    return Tracks(
+    return TrackSurvey(
         observations=len(ids),
         per_frame=(int(per_frame.min()), int(np.median(per_frame)), int(per_frame.max())),
         landmarks=len(seen),

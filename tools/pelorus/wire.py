@@ -45,7 +45,7 @@ class Received(NamedTuple):
     offset: int
 
 
-class Fault(NamedTuple):
+class SkippedFrame(NamedTuple):
     """A frame that was skipped."""
 
     offset: int
@@ -63,7 +63,7 @@ class Counts:
     malformed: int = 0
     too_long: int = 0
     missing: int = 0
-    faults: list[Fault] = field(default_factory=list)
+    faults: list[SkippedFrame] = field(default_factory=list)
 
     @property
     def good(self) -> int:
@@ -80,7 +80,7 @@ class Counts:
 
     def fault(self, offset: int, what: str) -> None:
         if len(self.faults) < FAULTS_KEPT:
-            self.faults.append(Fault(offset, what))
+            self.faults.append(SkippedFrame(offset, what))
 
 
 def encode(message: Message, sequence: int) -> bytes:
@@ -129,7 +129,7 @@ class Reader:
         The fault is listed before all others, which it may have caused.
         """
         self.counts.damaged += 1
-        self.counts.faults.insert(0, Fault(self.counts.bytes, f"damaged: {why}"))
+        self.counts.faults.insert(0, SkippedFrame(self.counts.bytes, f"damaged: {why}"))
 
     def _give_up_on_overlong(self) -> None:
         if len(self._held) <= STUFFED_BYTES_MAX:

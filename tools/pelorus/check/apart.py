@@ -56,7 +56,7 @@ Masks = dict[str, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
-class Apart:
+class HalvesApart:
     """How far apart the halves are, as a ratio of squares, for each way of splitting the points."""
 
     by_way: dict[str, float]
@@ -94,8 +94,8 @@ class Inflated(NamedTuple):
     """
 
     times: float
-    before: Apart
-    after: Apart
+    before: HalvesApart
+    after: HalvesApart
 
     @property
     def is_larger(self) -> bool:
@@ -136,7 +136,7 @@ class Parts:
         write(path, messages)
         self._parts.append(_Part(k, way, path))
 
-    def apart(self, settings: Settings) -> Apart:
+    def apart(self, settings: Settings) -> HalvesApart:
         """Returns how far apart the halves are with these settings; windows with too few data
         are skipped.
         """
@@ -156,7 +156,7 @@ class Parts:
             count = sum(n for _, n in found)
             if count >= ENOUGH:
                 ratios.setdefault(way, []).append(sum(d2 for d2, _ in found) / count)
-        return Apart(
+        return HalvesApart(
             {way: _typical(values) for way, values in ratios.items()},
             min(map(len, ratios.values()), default=0),
         )

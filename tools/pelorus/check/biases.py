@@ -25,7 +25,7 @@ ALLOWS = 2.0  # a bias of so many prior sigmas is allowed
 ALIKE = 0.7  # cosine of the largest angle between the halves' biases
 
 
-class Told(NamedTuple):
+class CommonBias(NamedTuple):
     """The common bias of both halves over the measured axes.
 
     `size` is 0 where chance may have made it; `known` is the standard error of one axis.
@@ -35,7 +35,7 @@ class Told(NamedTuple):
     known: float
 
 
-def told_by_halves(
+def biases_by_halves(
     bench: Bench, fixed: Settings, values: Mapping[str, float]
 ) -> tuple[dict[str, str], str]:
     """Returns the settings with bias priors, and what was found in words.
@@ -63,7 +63,7 @@ def told_by_halves(
     )
 
 
-def told_in_drift(
+def gyro_bias_in_drift(
     bench: Bench, fixed: Settings, values: Mapping[str, float], shared_px: float = 0.0
 ) -> tuple[dict[str, str], str]:
     """Returns the settings with a gyro bias prior for tracks that drift, and what was found in
@@ -97,7 +97,7 @@ def told_in_drift(
     return dict(fixed), f"{words}, which its prior allows"
 
 
-def _halves(bench: Bench, settings: Settings) -> dict[str, Told]:
+def _halves(bench: Bench, settings: Settings) -> dict[str, CommonBias]:
     """Returns the common bias by the name of its prior; axes that nothing measures have none."""
     ran = bench.run_all([{**settings, PART: part} for part in "01"], "biases of both halves")
     twists = bench.examined
@@ -108,18 +108,18 @@ def _halves(bench: Bench, settings: Settings) -> dict[str, Told]:
     ):
         there = np.any(readings != 0, axis=0)
         told = [(half.bias[axes][there], half.bias_variance[axes][there]) for half in ran]
-        found[name] = common_bias(*told[0], *told[1]) if there.any() else Told(0.0, 0.0)
+        found[name] = common_bias(*told[0], *told[1]) if there.any() else CommonBias(0.0, 0.0)
     return found
 
 
-def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> Told:
+def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> CommonBias:
     """Returns the common part of two biases with independent errors, from their product."""
     if not (min(var0.min(), var1.min()) > 0):
-        return Told(0.0, 0.0)
+        return CommonBias(0.0, 0.0)
     known = float(np.sqrt(np.mean(1 / (1 / var0 + 1 / var1))))
     products = b0 * b1
     score = float(np.sum(products / np.sqrt(var0 * var1))) / np.sqrt(len(products))
     alike = float(np.sum(products)) / float(np.linalg.norm(b0) * np.linalg.norm(b1) + 1e-30)
     if score < SURE or alike < ALIKE:
-        return Told(0.0, known)
-    return Told(float(np.sqrt(np.mean(products))), known)
+        return CommonBias(0.0, known)
+    return CommonBias(float(np.sqrt(np.mean(products))), known)

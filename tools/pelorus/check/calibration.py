@@ -14,7 +14,7 @@ from pelorus.frames import Message
 
 
 @dataclass(frozen=True)
-class Calibration:
+class CalibrationDoubts:
     """Doubts about scale and mounting. None: too few frames, or a fault must be mended first."""
 
     scale: Doubt | None = None
@@ -40,12 +40,12 @@ class Calibration:
 
 def calibration(
     agreed: Callable[[float], Agreement | None], messages: Sequence[Message]
-) -> Calibration:
+) -> CalibrationDoubts:
     """Returns what a run by twists shows of the calibration.
 
     `agreed` returns how far images and twists agree beside a velocity bias of a given sigma, m/s.
     """
     found = agreed(max(bias_of(messages), NO_BIAS_MPS))
-    if found is None or not found.told:
-        return Calibration()
-    return Calibration(doubted(found, messages), turned(found, messages))
+    if found is None or not found.is_known:
+        return CalibrationDoubts()
+    return CalibrationDoubts(doubted(found, messages), turned(found, messages))

@@ -18,7 +18,7 @@ from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
-from pelorus.check.verdict import Grade, Remark, Run, Verdict, of_search, verdict_of
+from pelorus.check.verdict import Grade, JudgedRun, Remark, Verdict, of_search, verdict_of
 from pelorus.console import progress, step
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
@@ -139,7 +139,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
 
 def _whole(
     program: Path, recording: Path, settings: Settings, folder: Path, name: str
-) -> Run | None:
+) -> JudgedRun | None:
     """Returns the replay of the whole recording; None if no frame could be used (a clock is
     off).
     """
@@ -150,10 +150,10 @@ def _whole(
         if NOTHING_USED in str(error):
             return None
         raise
-    return Run.of(wire.messages_of(outputs.log))
+    return JudgedRun.of(wire.messages_of(outputs.log))
 
 
-def _figures(run: Run, truth: Trajectory | None) -> dict[str, str]:
+def _figures(run: JudgedRun, truth: Trajectory | None) -> dict[str, str]:
     found = {
         "innovations over their noise": f"{run.nis:.2f}",
         "matches rejected": f"{run.gated_share:.1%}",

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.calibrated import PARTS, Calibrated, Part, last_calibrated
-from pelorus.check.calibration import Calibration
+from pelorus.calibrated import PARTS, Calibrated, CalibrationPart, last_calibrated
+from pelorus.check.calibration import CalibrationDoubts
 from pelorus.check.mount import SURE, Turned
 from pelorus.check.options import Settings
 from pelorus.frames import Message
@@ -41,7 +41,7 @@ class Estimated:
     of the camera from the search's, sigmas.
     """
 
-    told: Calibrated
+    estimate: Calibrated
     off: tuple[str, ...]
     refused: tuple[str, ...]
     apart: float | None  # None: the search found no turn, or the turn is not estimated
@@ -49,11 +49,11 @@ class Estimated:
     @property
     def answers_turn(self) -> bool:
         """Returns whether the filter's estimate explains the turn that the search found."""
-        return bool(self.told.estimated >> TURN.start & 1) and (self.apart or 0.0) <= SURE
+        return bool(self.estimate.estimated >> TURN.start & 1) and (self.apart or 0.0) <= SURE
 
     def words(self) -> str:
         """Returns the estimate as one sentence."""
-        parts = list(self.told.parts())
+        parts = list(self.estimate.parts())
         clear = [_with_sigma(*part) for part in parts if abs(part[1]) > TOLD * part[2]]
         said = "the filter estimates the calibration on the way"
         if self.refused:
@@ -82,35 +82,42 @@ class Estimated:
         return bool(self.off or self.refused) or (self.apart or 0.0) > SURE
 
 
-def _with_sigma(part: Part, value: float, sigma: float) -> str:
+def _with_sigma(part: CalibrationPart, value: float, sigma: float) -> str:
     return f"{part.name} {value:+.3g} +- {sigma:.2g} {part.unit}"
 
 
-def estimated(messages: Sequence[Message], found: Calibration) -> Estimated | None:
+def estimated(messages: Sequence[Message], found: CalibrationDoubts) -> Estimated | None:
     """Returns what a run estimated; None where nothing is estimated."""
-    told = last_calibrated(messages)
-    if told is None:
+    estimate = last_calibrated(messages)
+    if estimate is None:
         return None
-    return Estimated(told, _off(messages, told), _refused(messages, told), _apart(told, found.turn))
+    return Estimated(
+        estimate,
+        _off(messages, estimate),
+        _refused(messages, estimate),
+        _turns_apart(estimate, found.turn),
+    )
 
 
-def _off(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(_settings_off(messages, told)))
+def _off(messages: Sequence[Message], estimate: Calibrated) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_settings_off(messages, estimate)))
 
 
-def _settings_off(messages: Sequence[Message], told: Calibrated) -> Iterator[str]:
-    for part, value, _ in told.parts():
+def _settings_off(messages: Sequence[Message], estimate: Calibrated) -> Iterator[str]:
+    for part, value, _ in estimate.parts():
         setting = PRIORS[part.key.partition("_")[0]]
         si = value / (1.0 if part.unit == "px" else part.scale)
         if abs(si) > OFF_PRIOR * (in_force(messages, setting) or np.inf):
             yield setting
 
 
-def _refused(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
+def _refused(messages: Sequence[Message], estimate: Calibrated) -> tuple[str, ...]:
     """Returns the parts that the setting calibrate names but that are not estimated at the end."""
     asked = int(in_force(messages, "calibrate") or 0)
     words = SETTINGS[IDS["calibrate"]].words
-    parts = [(part.key.partition("_")[0], told.estimated >> k & 1) for k, part in enumerate(PARTS)]
+    parts = [
+        (part.key.partition("_")[0], estimate.estimated >> k & 1) for k, part in enumerate(PARTS)
+    ]
     return tuple(
         word
         for bit, word in enumerate(words)
@@ -118,22 +125,22 @@ def _refused(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
     )
 
 
-def _apart(told: Calibrated, turn: Turned | None) -> float | None:
+def _turns_apart(estimate: Calibrated, turn: Turned | None) -> float | None:
     """Returns the distance between the filter's and the search's turn of the camera, sigmas."""
-    if turn is None or not told.estimated >> TURN.start & 1:
+    if turn is None or not estimate.estimated >> TURN.start & 1:
         return None
-    by_filter, P = turn_in_body(told)
+    by_filter, P = turn_in_body(estimate)
     off = turn.turn_rad - by_filter
     return float(np.sqrt(off @ np.linalg.solve(turn.covariance + P, off)))
 
 
-def turn_in_body(told: Calibrated) -> tuple[Floats, Floats]:
+def turn_in_body(estimate: Calibrated) -> tuple[Floats, Floats]:
     """Returns the camera's turn about the body's axes, rad, and its covariance, as Turned has them.
 
     T_CB <- Exp(phi) T_CB is T_CB Exp(R_BC phi).
     """
-    R_BC = np.asarray(told.R_CB).T
-    return R_BC @ told.corrected[TURN], R_BC @ np.diag(told.sigma[TURN] ** 2) @ R_BC.T
+    R_BC = np.asarray(estimate.R_CB).T
+    return R_BC @ estimate.corrected[TURN], R_BC @ np.diag(estimate.sigma[TURN] ** 2) @ R_BC.T
 
 
 def without_clock(given: Settings) -> Settings:

@@ -25,7 +25,7 @@ Build = Callable[[Mapping[str, float]], Settings]
 
 
 @dataclass(frozen=True)
-class Found:
+class BestFound:
     """The best settings that were tried."""
 
     values: dict[str, float]
@@ -39,7 +39,7 @@ def search_noises(
     parameters: Mapping[str, Parameter],
     steps: Sequence[float],
     what: str = "noise",
-) -> Found:
+) -> BestFound:
     """Searches the given noises within their limits; the settings in `side` stay."""
     build = lambda v: {**side, **written(v, parameters)}  # noqa: E731 - named where it is used
     return search(bench, start, limits(start, parameters), build, steps, what)
@@ -52,11 +52,11 @@ def search(
     build: Build,
     steps: Sequence[float],
     what: str = "noise",
-) -> Found:
+) -> BestFound:
     """Searches from `start` in rounds; `build` makes settings of values, each kept within its
     limits.
     """
-    best = Found(dict(start), bench.run(build(start)))
+    best = BestFound(dict(start), bench.run(build(start)))
     for round_, step in enumerate(steps):
         said = f"{what}, round {round_ + 1} of {len(steps)}"
         better = _round(bench, best, within, build, step, said)
@@ -68,12 +68,12 @@ def search(
 
 def _round(
     bench: Bench,
-    best: Found,
+    best: BestFound,
     within: Mapping[str, tuple[float, float]],
     build: Build,
     step: float,
     what: str,
-) -> Found:
+) -> BestFound:
     tried: list[dict[str, float]] = []
     for name in best.values:
         for factor in (step, 1 / step):
@@ -84,8 +84,8 @@ def _round(
         up, down = outcomes[2 * k].cost, outcomes[2 * k + 1].cost
         steps = foot(down, best.outcome.cost, up)
         moved[name] = _clipped(within[name], best.values[name] * step**steps)
-    together = Found(moved, bench.run(build(moved)))
-    singly = (Found(v, o) for v, o in zip(tried, outcomes, strict=True))
+    together = BestFound(moved, bench.run(build(moved)))
+    singly = (BestFound(v, o) for v, o in zip(tried, outcomes, strict=True))
     return min((best, together, *singly), key=lambda found: found.outcome.cost)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned, unless_surer
-from pelorus.check.tracks_noise import told_apart
+from pelorus.check.tracks_noise import differs_clearly
 
 SETTING = "pixel-sigma"
 
@@ -20,6 +20,6 @@ def with_shared_rows(bench: Bench, tuned: Tuned) -> Tuned:
     if SETTING not in tuned.settings or not shared_px > 0:
         return tuned
     was_px = float(tuned.settings[SETTING])
-    if not (shared_px > was_px and told_apart(shared_px, was_px)):
+    if not (shared_px > was_px and differs_clearly(shared_px, was_px)):
         return tuned
     return unless_surer(bench, tuned, tuned.settings | {SETTING: f"{shared_px:.3g}"})

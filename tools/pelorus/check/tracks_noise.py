@@ -82,7 +82,7 @@ class TrackNoise:
         return {DRIFT: given[DRIFT] if is_about_it else f"{told:.2g}"}
 
 
-def told_apart(found: float, given: float) -> bool:
+def differs_clearly(found: float, given: float) -> bool:
     """Returns whether a sigma found clearly differs from the given one; False where it is NaN."""
     return bool(max(found / given, given / found) > KNOWN_TO)
 

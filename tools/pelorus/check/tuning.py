@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pelorus.check import clock, scale, tuning_imu
-from pelorus.check.biases import WIDE, told_by_halves, told_in_drift
+from pelorus.check.biases import WIDE, biases_by_halves, gyro_bias_in_drift
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, SCALE, Bench
 from pelorus.check.parameters import (
@@ -29,9 +29,9 @@ from pelorus.check.parameters import (
     starting,
     written,
 )
-from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
-from pelorus.check.tracks_noise import DRIFT, TrackNoise, told_apart, track_noise
-from pelorus.converters.twist_noise import Spread, difference_of_a_reading
+from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
+from pelorus.check.tracks_noise import DRIFT, TrackNoise, differs_clearly, track_noise
+from pelorus.converters.twist_noise import TwistSpread, difference_of_a_reading
 
 SPREAD_FRAMES = 20  # enough to measure a spread to a fifth, as a start
 FINE = (1.3, 1.15)
@@ -59,7 +59,7 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
         fixed.pop(DRIFT, None)  # the biases that one step shows are estimated without drift
         found = _of_drifting_tracks(bench, fixed, start, noise)
         shared_px = noise.rows.shared_px if noise.rows is not None else 0.0
-        fixed, words = told_in_drift(bench, fixed, found.values, shared_px)
+        fixed, words = gyro_bias_in_drift(bench, fixed, found.values, shared_px)
         offset_s = float(fixed.pop(OFFSET))
         fixed |= noise.setting(given)
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
@@ -72,7 +72,7 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
         values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, values, TWIST, COARSE).values
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
-    fixed, of_bias = told_by_halves(bench, moved, values)
+    fixed, of_bias = biases_by_halves(bench, moved, values)
     off = scale.off_by(bench, moved | written(values, TWIST))
     if one_clock:
         fixed, found, of_clock = clocked(bench, fixed, values, given, off)
@@ -101,7 +101,7 @@ def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[s
     return min(found, key=lambda some: some.outcome.cost).values
 
 
-def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
+def _of_twists(start: Mapping[str, float], spread: TwistSpread) -> dict[str, float]:
     """Returns the twists' sigmas alone, as the images show them."""
     said = {"velocity": spread.velocity_mps, "gyro": spread.gyro_radps}
     of = {name: said.get(name.partition("-")[0], 0.0) for name in start}
@@ -113,19 +113,19 @@ def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
 
 def _of_drifting_tracks(
     bench: Bench, fixed: Settings, start: Mapping[str, float], noise: TrackNoise
-) -> Found:
+) -> BestFound:
     """Keeps the given sigmas unless the data contradict them, and takes pixel-sigma from the
     tracks.
     """
     values = dict(start)
-    if told_apart(noise.stands_for_px, start["pixel"]):
+    if differs_clearly(noise.stands_for_px, start["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     most = difference_of_a_reading(bench.examined)
     if most is not None:
         for name, value in _of_twists(start, most).items():
-            if value < start[name] and told_apart(value, start[name]):
+            if value < start[name] and differs_clearly(value, start[name]):
                 values[name] = value
-    return Found(values, bench.run({**fixed, **written(values, TWIST)}))
+    return BestFound(values, bench.run({**fixed, **written(values, TWIST)}))
 
 
 # --- clocks ---------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def clocked(
     values: Mapping[str, float],
     given: Settings,
     off: float = 0.0,
-) -> tuple[dict[str, str], Found, str]:
+) -> tuple[dict[str, str], BestFound, str]:
     """Returns timing and offset of the camera's clock as settings, the noises again if these
     change, and words.
 
@@ -191,7 +191,7 @@ def _moved(
 # --- axes -----------------------------------------------------------------------------------------
 
 
-def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
+def _axes(bench: Bench, fixed: Settings, found: BestFound) -> tuple[BestFound, str]:
     """Returns a sigma for each axis where that pays: two parameters more for each kind."""
     split = {"pixel": found.values["pixel"]}
     for name in ("velocity", "gyro"):
@@ -206,10 +206,10 @@ def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
     for name in ("velocity", "gyro"):
         alike = {k: v for k, v in result.values.items() if not k.startswith(name)}
         alike |= {name: pooled(result.values, name)}
-        one = Found(alike, bench.run({**fixed, **written(alike, TWIST)}))
+        one = BestFound(alike, bench.run({**fixed, **written(alike, TWIST)}))
         if name in found.values:  # starts from the best value for all axes
             best = {**alike, name: found.values[name]}
-            other = Found(best, bench.run({**fixed, **written(best, TWIST)}))
+            other = BestFound(best, bench.run({**fixed, **written(best, TWIST)}))
             one = min(one, other, key=lambda some: some.outcome.cost)
         gain = result.outcome.gain_over(one.outcome)
         if gain > 2 * PAYS:

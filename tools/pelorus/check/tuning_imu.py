@@ -30,8 +30,8 @@ from pelorus.check.parameters import (
     starting,
     written,
 )
-from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
-from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
+from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
+from pelorus.check.tracks_noise import TrackNoise, differs_clearly, track_noise
 from pelorus.inertial_survey import scatter
 
 LOOSE = 10.0  # factor of the noises while the clock is far off
@@ -184,7 +184,7 @@ def _scatter(bench: Bench) -> dict[str, float]:
     return {"gyro": gyro, "accel": accel}
 
 
-def _at_least_scatter(bench: Bench, side: Settings, found: Found) -> Found:
+def _at_least_scatter(bench: Bench, side: Settings, found: BestFound) -> BestFound:
     """Raises noises below the filter's own least ones to these: below them the likelihood is
     constant.
     """
@@ -192,11 +192,11 @@ def _at_least_scatter(bench: Bench, side: Settings, found: Found) -> Found:
     values = {name: max(value, least.get(name, 0.0)) for name, value in found.values.items()}
     if values == found.values:
         return found
-    return Found(values, bench.run({**side, **written(values, IMU)}))
+    return BestFound(values, bench.run({**side, **written(values, IMU)}))
 
 
 def _untold(
-    bench: Bench, side: Settings, found: Found, parameters: Mapping[str, Parameter]
+    bench: Bench, side: Settings, found: BestFound, parameters: Mapping[str, Parameter]
 ) -> list[str]:
     """Returns the settings for which far larger or smaller values would be about as likely."""
     out = []
@@ -219,8 +219,8 @@ def _of_drive(untold: list[str]) -> str:
 
 
 def noises(
-    bench: Bench, side: Settings, found: Found, given: Mapping[str, float]
-) -> tuple[Found, str]:
+    bench: Bench, side: Settings, found: BestFound, given: Mapping[str, float]
+) -> tuple[BestFound, str]:
     """Keeps a given noise that the drive cannot measure, if it is about as likely and no smaller.
 
     Trusting an IMU too much is the worse fault. Where the frames measure the motion far better than
@@ -233,7 +233,7 @@ def noises(
             values = {**found.values, name: given[name]}
             usual = bench.run({**side, **written(values, IMU)})
             if found.outcome.gain_over(usual) < PAYS:
-                found = Found(values, usual)
+                found = BestFound(values, usual)
     if not untold:
         return found, "pixel-sigma, gyro-noise and accel-noise are told by the drive"
     kept = ", ".join(f"{found.values[n]:.3g}" for n in IMU if IMU[n].setting in untold)
@@ -255,7 +255,7 @@ def _of_drifting_tracks(
     tracks.
     """
     values = dict(values)
-    if told_apart(noise.stands_for_px, values["pixel"]):
+    if differs_clearly(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     settings = {**side, **noise.setting(side), **written(values, PIXEL | IMU | WALKS)}
     offset = clock.of_imu(bench, settings | fewer_slots(settings), float(side[OFFSET]))

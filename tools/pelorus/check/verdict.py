@@ -16,13 +16,13 @@ from enum import IntEnum
 import numpy as np
 
 from pelorus.arrivals import late_ones
-from pelorus.check.calibration import Calibration, calibration
+from pelorus.check.calibration import CalibrationDoubts, calibration
 from pelorus.check.estimated import Estimated, estimated
 from pelorus.check.known import Known, known_of
 from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned
 from pelorus.check.scale import Doubt
-from pelorus.check.tracks_noise import DRIFT, told_apart
+from pelorus.check.tracks_noise import DRIFT, differs_clearly
 from pelorus.evaluation import judge
 from pelorus.faults.mend import BEHIND, CANNOT, known_words
 from pelorus.frame_table import BIASES, FrameTable, frame_table
@@ -146,7 +146,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Run:
+class JudgedRun:
     """A whole replay with one set of settings."""
 
     messages: Sequence[Message]
@@ -154,7 +154,7 @@ class Run:
     health: TimeLine
 
     @classmethod
-    def of(cls, messages: Sequence[Message]) -> Run:
+    def of(cls, messages: Sequence[Message]) -> JudgedRun:
         return cls(messages, frame_table(messages), time_line(messages) or TimeLine(0, {}, ()))
 
     @property
@@ -198,16 +198,16 @@ class Run:
 def verdict_of_log(messages: Sequence[Message]) -> Verdict:
     """Judges a filter's result that contains the recording; no value in it raises an error."""
     with np.errstate(all="ignore"):
-        run = Run.of(messages)
+        run = JudgedRun.of(messages)
         try:
             return verdict_of(run, known_of(messages))
         except np.linalg.LinAlgError:  # nothing can be fitted: judges the run alone
             return verdict_of(run, Known())
 
 
-def verdict_of(run: Run | None, known: Known) -> Verdict:
+def verdict_of(run: JudgedRun | None, known: Known) -> Verdict:
     """Judges a run. It is not examined where a fault of the recording must be mended first."""
-    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.told) for f in known.faults]
+    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.sentence) for f in known.faults]
     agreed = known.judged.agreed
     if known.is_stopped or run is None:
         told = BEHIND if agreed is None else f"{known_words(agreed)}; {CANNOT}"
@@ -223,7 +223,7 @@ def verdict_of(run: Run | None, known: Known) -> Verdict:
     return Verdict(overall(found), tuple(found), camera.share, settings, nis_off)
 
 
-def _of_run(run: Run, known: Known) -> Iterator[Remark]:
+def _of_run(run: JudgedRun, known: Known) -> Iterator[Remark]:
     yield from of_length(run.health.frames)
     yield from _diverged(run)
     yield from _health(run)
@@ -257,7 +257,7 @@ def of_length(frames: int) -> Iterator[Remark]:
         )
 
 
-def _health(run: Run) -> Iterator[Remark]:
+def _health(run: JudgedRun) -> Iterator[Remark]:
     """Yields remarks on lost and doubted frames; those before an IMU's start are not lost."""
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
     if run.lost_share > LOST_MANY or run.doubted_share > DOUBTED_HALF:
@@ -274,7 +274,7 @@ def _health(run: Run) -> Iterator[Remark]:
         )
 
 
-def _order(run: Run) -> Iterator[Remark]:
+def _order(run: JudgedRun) -> Iterator[Remark]:
     """Yields a remark where times go back, and no twist-delay mends it."""
     refused = [m.subject for m in run.messages if isinstance(m, Report) and m.status == LATE]
     for late in late_ones(run.messages):
@@ -282,7 +282,7 @@ def _order(run: Run) -> Iterator[Remark]:
             yield Remark(Grade.BAD, late.words)
 
 
-def _diverged(run: Run) -> Iterator[Remark]:
+def _diverged(run: JudgedRun) -> Iterator[Remark]:
     """Yields a remark where a variance is not positive: the arithmetic failed."""
     frames = run.frames.t_ns[(run.frames.reasons & NOT_POSITIVE) != 0]
     if len(frames):
@@ -294,7 +294,7 @@ def _diverged(run: Run) -> Iterator[Remark]:
         )
 
 
-def _truth(run: Run) -> Iterator[Remark]:
+def _truth(run: JudgedRun) -> Iterator[Remark]:
     """Yields a remark on whether the errors match the covariance, where the truth is known."""
     if truth_in(run.messages) is None:
         return
@@ -308,7 +308,7 @@ def _truth(run: Run) -> Iterator[Remark]:
     yield Remark(grade, words)
 
 
-def _gate(run: Run) -> Iterator[Remark]:
+def _gate(run: JudgedRun) -> Iterator[Remark]:
     """Yields a remark on the share of gated matches, and where it is far above the usual."""
     share = run.gated_share
     grade = Grade.BAD if share > GATED_MOST else Grade.CARE if share > GATED_MANY else Grade.GOOD
@@ -321,7 +321,7 @@ def _gate(run: Run) -> Iterator[Remark]:
     yield Remark(grade, words)
 
 
-def _worst_window(run: Run, origin_ns: int) -> tuple[float, float, float] | None:
+def _worst_window(run: JudgedRun, origin_ns: int) -> tuple[float, float, float] | None:
     t = (run.frames.t_ns - origin_ns) * 1e-9
     if not len(t):
         return None
@@ -335,13 +335,13 @@ def _worst_window(run: Run, origin_ns: int) -> tuple[float, float, float] | None
     return float(t[0] + k * WINDOW_S), float(t[0] + (k + 1) * WINDOW_S), float(shares[k])
 
 
-def _used(run: Run) -> Iterator[Remark]:
+def _used(run: JudgedRun) -> Iterator[Remark]:
     used = float(np.median(run.frames["used"]))
     if used < FEW_USED:
         yield Remark(Grade.CARE, f"only {used:.0f} observations of a frame are used (median)")
 
 
-def _nis(run: Run, known: Known) -> Iterator[Remark]:
+def _nis(run: JudgedRun, known: Known) -> Iterator[Remark]:
     """Yields a remark where the NIS exceeds 1; noises that cover lasting errors make it smaller."""
     if not np.isfinite(run.nis):
         return
@@ -355,7 +355,7 @@ def _nis(run: Run, known: Known) -> Iterator[Remark]:
         yield Remark(Grade.CARE, f"{words}: the noise is not what these settings describe")
 
 
-def _biases(run: Run) -> Iterator[Remark]:
+def _biases(run: JudgedRun) -> Iterator[Remark]:
     """Yields remarks on biases beyond 3 sigma of their priors: stereo and odometry disagree."""
     by_imu = run.frames.by_imu
     if not (by_imu or in_force(run.messages, "bias")):
@@ -375,7 +375,7 @@ def _biases(run: Run) -> Iterator[Remark]:
             )
 
 
-def _tracks(run: Run, known: Known) -> Iterator[Remark]:
+def _tracks(run: JudgedRun, known: Known) -> Iterator[Remark]:
     noise = known.noise
     if noise is None:
         return
@@ -399,7 +399,7 @@ def _tracks(run: Run, known: Known) -> Iterator[Remark]:
     )
 
 
-def _for_tracks(run: Run, known: Known) -> dict[str, str]:
+def _for_tracks(run: JudgedRun, known: Known) -> dict[str, str]:
     """Returns the settings that cover what the tracks show, where those of the run do not."""
     noise = known.noise
     if noise is None or not noise.drifts:
@@ -408,12 +408,16 @@ def _for_tracks(run: Run, known: Known) -> dict[str, str]:
     told = noise.setting({DRIFT: was, "model": _model(run)})
     told = {} if told.get(DRIFT) == was else told
     pixel_px = in_force(run.messages, PIXEL)
-    if pixel_px and noise.stands_for_px > pixel_px and told_apart(noise.stands_for_px, pixel_px):
+    if (
+        pixel_px
+        and noise.stands_for_px > pixel_px
+        and differs_clearly(noise.stands_for_px, pixel_px)
+    ):
         told[PIXEL] = f"{noise.stands_for_px:.3g}"
     return told
 
 
-def _model(run: Run) -> str:
+def _model(run: JudgedRun) -> str:
     model = in_force(run.messages, "model")
     return "" if model is None else SETTINGS[IDS["model"]].words[int(model)]
 
@@ -438,7 +442,7 @@ def _halves(tuned: Tuned) -> Iterator[str]:
     yield words
 
 
-def of_calibration(found: Calibration, own: Estimated | None = None) -> Iterator[Remark]:
+def of_calibration(found: CalibrationDoubts, own: Estimated | None = None) -> Iterator[Remark]:
     """Yields what images and twists show of the camera; `own` is the filter's estimate of it."""
     if found.scale is not None:
         yield from of_scale(found.scale)

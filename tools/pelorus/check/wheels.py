@@ -59,7 +59,7 @@ def remarks(program: Path, messages: Sequence[Message], settings: Settings) -> l
         own = [m for m in wheels if tuple(m.at_B_m.tolist()) == at]
         name = f"the wheel at y = {at[1]:g} m" if len(places) > 1 else "the wheels"
         fitted = _fitted(own, poses, len(places) > 1)
-        found += [] if fitted is None else _told(name, fitted, at[1], len(places) > 1)
+        found += [] if fitted is None else _remarks_on(name, fitted, at[1], len(places) > 1)
     return found
 
 
@@ -111,7 +111,7 @@ def _between(t_ns: Times, poses: Sequence[Pose]) -> tuple[Floats, Floats, NDArra
     return found[:, :3], found[:, 3:], there & (np.diff(seconds)[after - 1] <= PAUSE_S)
 
 
-def _told(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
+def _remarks_on(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
     more, sure = found.scale - 1, found.scale_sigma
     words = f"{name}: against pictures and IMU the speed is {more:+.1%} off, sigma {sure:.1%}"
     if abs(more) > max(SIGMAS * sure, OFF_LEAST):
@@ -119,13 +119,13 @@ def _told(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
         how = (
             f"{words}: the radius is {which} than was told (divide the speed by {found.scale:.3f})"
         )
-        told = [Remark(Grade.CARE, how)]
+        about = [Remark(Grade.CARE, how)]
     else:
-        told = [Remark(Grade.GOOD, words)]
+        about = [Remark(Grade.GOOD, words)]
     if apart:
         off_m, sigma = found.left_m - left_m, found.left_sigma_m
         if abs(off_m) > max(SIGMAS * sigma, APART_LEAST * abs(left_m)):
-            told.append(
+            about.append(
                 Remark(
                     Grade.CARE,
                     f"{name}: by its readings it sits at y = {found.left_m:.3f} m, sigma "
@@ -133,11 +133,11 @@ def _told(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
                 )
             )
     if found.scatter > SCATTER_MOST:
-        told.append(
+        about.append(
             Remark(
                 Grade.CARE,
                 f"{name}: readings scatter by {found.scatter:.1f} times their sigma: tell a "
                 "larger one",
             )
         )
-    return told
+    return about

@@ -15,7 +15,7 @@ from pelorus.recording import Recording
 
 
 def _verdict(finding: Finding) -> str:
-    if not finding.told:
+    if not finding.is_conclusive:
         return "[yellow]cannot tell[/]"
     if finding.measured:
         return "[green]measured[/]"

@@ -81,7 +81,7 @@ def course(
             subject,
             reference,
             found_programs,
-            trial.Options(ours, changed),
+            trial.TrialOptions(ours, changed),
             made(folder / "runs" / bare_name(subject.path)),
         )
         for (subject, reference), ours in zip(pairs, options, strict=True)

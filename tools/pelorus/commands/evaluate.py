@@ -152,8 +152,8 @@ def _doubts(
     """Returns doubts whether one of the two was misread; the filter's own result is not doubted."""
     here, there = match(mine[1], reference, tolerance_ns)
     name = f"the truth in {mine[0]}" if truth is None else str(truth)
-    a = misread.Named(str(mine[0]), mine[1].poses.at(here))
-    return misread.doubts(a, misread.Named(name, reference.poses.at(there)), replayed)
+    a = misread.NamedPoses(str(mine[0]), mine[1].poses.at(here))
+    return misread.doubts(a, misread.NamedPoses(name, reference.poses.at(there)), replayed)
 
 
 def _until(reference: Trajectory, estimate: Trajectory, first_s: float) -> Trajectory:

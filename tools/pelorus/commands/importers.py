@@ -22,7 +22,7 @@ from pelorus.converters import bag, csv, euroc, kitti, ros, streams
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
-from pelorus.converters.ros_motion import Moving, Wheels
+from pelorus.converters.ros_motion import MotionTopics, Wheels
 from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
@@ -51,7 +51,7 @@ SHARED: dict[str, tuple[Any, Any]] = {
 }
 
 
-class Stamps(StrEnum):
+class StampSource(StrEnum):
     """Times of a bag's messages: of their headers, or of their arrival."""
 
     HEADER = bag.HEADER
@@ -237,7 +237,9 @@ def _ros(
         "", help="Of what moves the body, for /tf_static; else as its messages say."
     ),
     camera_frame: str = typer.Option("", help="Likewise, of the left camera; z looks forward."),
-    stamps: Stamps = typer.Option(Stamps.HEADER, help="Times of the headers, or of the arrival."),
+    stamps: StampSource = typer.Option(
+        StampSource.HEADER, help="Times of the headers, or of the arrival."
+    ),
     begin: float = typer.Option(
         0.0, "--from", metavar="S", help="Leave out what arrived before, s since the bag began."
     ),
@@ -260,7 +262,7 @@ def _ros(
             right_info_topic,
             camera_frame,
         ),
-        Moving(
+        MotionTopics(
             twist_topic,
             gyro_topic,
             imu_topic,
@@ -309,6 +311,6 @@ def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | No
 
 def converted(found: Streams, timing: TwistTiming | None, fix: bool, target: Path) -> None:
     """Prints the remarks, makes the recording, and writes it."""
-    for remark in found.told:
+    for remark in found.all_remarks:
         out.print(escape(remark))
     write(*streams.converted(found, timing, fix), target)

@@ -118,7 +118,7 @@ def _draw(
     """Writes pictures and page; returns the page's verdict, and further remarks."""
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page  # noqa: PLC0415 - as above
-    from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
+    from pelorus.report.beside import NamedLog, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
     from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
@@ -138,7 +138,7 @@ def _draw(
     found = explain(main.messages)
     with waiting("judging"):
         verdict = found.verdict
-    drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
+    drift = drift_table([NamedLog(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
     answer = answers.with_setup(answer, main.messages)
     if source is not None:
@@ -184,7 +184,7 @@ def _json(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) 
         "recording": str(compared.subject.path),
         **verdict.json(),
         "remarks": lines,
-        "health": compared.main.health.told(compared.origin_ns),
+        "health": compared.main.health.lines(compared.origin_ns),
         "runs": {run.name: run.summary for run in compared.runs},
     }
 
@@ -201,7 +201,7 @@ def _tell(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) 
     out.print(table)
     for line in lines:
         out.print(f"[yellow]-[/] {escape(line)}")
-    summary, *spells = compared.main.health.told(compared.origin_ns)
+    summary, *spells = compared.main.health.lines(compared.origin_ns)
     out.print(f"health: {summary}")
     for spell in spells:
         out.print(f"  {escape(spell)}")

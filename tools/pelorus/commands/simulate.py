@@ -16,7 +16,7 @@ from pelorus.console import err
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
-from pelorus.simulation.imu import Imu, ImuFaults
+from pelorus.simulation.imu import ImuFaults, SimulatedImu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.readings import Sensing, options_without_meaning
 from pelorus.simulation.settings import Numbers, Span, option_name, settings_of
@@ -47,7 +47,7 @@ def run(target: Path, **given: Any) -> None:
         **_values(Options, given),
         mishaps=mishaps,
         readings=readings,
-        imu=Imu(**_values(Imu, given)),
+        imu=SimulatedImu(**_values(SimulatedImu, given)),
         imu_faults=ImuFaults(**_values(ImuFaults, given)),
     )
     recording = simulate(options).recording
@@ -167,7 +167,7 @@ run.__dict__["__signature__"] = inspect.Signature(
             "target", inspect.Parameter.KEYWORD_ONLY, default=TARGET, annotation=Path
         ),
         *_parameters(Options, None),
-        *_parameters(Imu, "IMU in place of twists"),
+        *_parameters(SimulatedImu, "IMU in place of twists"),
         *_parameters(Mishaps, "What goes wrong"),
         *_parameters(ImuFaults, "What goes wrong with an IMU"),
         *(p for sensor in SMALL_SENSORS for p in _of_sensor(sensor)),

@@ -84,14 +84,14 @@ class Columns:
     seen: dict[Path, list[str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)  # on the files that were read
     ground: Ground = field(default_factory=Ground)
-    rows: list[instances.Asked] = field(default_factory=list)
+    rows: list[instances.AskedRows] = field(default_factory=list)
 
     @classmethod
     def of(cls, words: list[str], crs: str = "", rows: Sequence[str] = ()) -> Columns:
         """Parses the words of --columns, of --crs and of --rows."""
         parts = [part.strip() for word in words for part in word.split(",") if part.strip()]
         given = [_column(part) for part in parts if not _says_nothing(part)]
-        asked = [instances.Asked.of(words) for words in rows]
+        asked = [instances.AskedRows.of(words) for words in rows]
         return cls(given, ground=Ground(crs), rows=asked)
 
     def read(self, path: Path, file: str) -> Table:

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from pelorus import foreign, trajectory
 from pelorus.converters import readings_csv, streams, twist_axes, wheels
 from pelorus.converters.columns import Columns, example
-from pelorus.converters.streams import Readings, Seen, Streams, TwistIn, Twists
+from pelorus.converters.streams import RawTracks, Readings, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
 from pelorus.foreign import ForeignFileError
@@ -110,7 +110,7 @@ def read(
     if sources.stereo is None:
         frames = _blind(motion, small, columns.remarks)
     else:
-        frames = Seen(sources.stereo, *_stereo(columns.read(sources.stereo, "stereo")))
+        frames = RawTracks(sources.stereo, *_stereo(columns.read(sources.stereo, "stereo")))
     columns.require_used()
     on_earth = columns.ground.origin_m is not None
     return Streams(calibrated, frames, motion, truth, small, columns.remarks, on_earth)
@@ -127,7 +127,7 @@ def _calibrated(sources: Sources) -> Calibrated:
     )
 
 
-def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) -> Seen:
+def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) -> RawTracks:
     """Returns frames without points at the times of the small sensors' readings.
 
     There the filter reports its pose, which is compared with a truth.
@@ -144,7 +144,7 @@ def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) 
     )
     nothing = np.empty(0, np.int64)
     tracks = Tracks(len(t_ns), nothing.astype(np.intp), nothing, np.empty((0, 4)))
-    return Seen(motion.where, t_ns, tracks)
+    return RawTracks(motion.where, t_ns, tracks)
 
 
 # --- motion ---------------------------------------------------------------------------------------

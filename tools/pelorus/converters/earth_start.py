@@ -110,5 +110,5 @@ def _untold(why: str) -> Finding:
         why,
         "positions are used only if the start's place and heading are given in their axes: by a "
         "truth (--truth), or by START",
-        told=False,
+        is_conclusive=False,
     )

@@ -136,7 +136,11 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
             f"{where[0]} and {where[1]}: {len(both)} pairs, taken within "
             f"{images.APART_NS * 1e-6:g} ms; {alone} pictures have no partner"
             + (f", {len(lost)} are not there or cut off, {lost[0]} first" if lost else "")
-            + (_apart(of_left, of_right) if len(of_left) and len(of_right) and not lost else "")
+            + (
+                _apart_words(of_left, of_right)
+                if len(of_left) and len(of_right) and not lost
+                else ""
+            )
         )
     if len(both) < images.PAIRS_MIN:
         raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are expected")
@@ -162,7 +166,7 @@ def _times(listed: dict[int, Path], remarks: list[str]) -> Times:
     return t_ns[~unset]
 
 
-def _apart(left_ns: Times, right_ns: Times) -> str:
+def _apart_words(left_ns: Times, right_ns: Times) -> str:
     """Returns in words how far apart the times of cameras without a common trigger are."""
     apart_ns = np.abs(right_ns[motion.nearest(right_ns, left_ns)] - left_ns)
     return (

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pelorus import inertial
 from pelorus.faults.finding import Finding
-from pelorus.inertial import Inertial, Moving
+from pelorus.inertial import Inertial, MotionState
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
@@ -41,8 +41,8 @@ def compare(recording: Recording, truth: TrueMotion) -> Finding:
     truth = truth.at(slice(int(first), int(last)))
     before, after = truth.at(slice(None, -1)), truth.at(slice(1, None))
     if not len(after.t_ns):
-        return Finding("noise of the readings", False, "no two true poses", "", told=False)
-    start = Moving(before.R, before.p, before.v_B)
+        return Finding("noise of the readings", False, "no two true poses", "", is_conclusive=False)
+    start = MotionState(before.R, before.p, before.v_B)
     ends = inertial.coasted(
         _without_bias(readings, truth), before.t_ns, after.t_ns, start, noise.gravity
     )

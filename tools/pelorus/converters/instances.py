@@ -22,7 +22,7 @@ NAMES = ("i", "instance", "imu", "sensor", "sensor_id", "device_id", "multi_id",
 UNLIKE = 2.0  # ratio of differences between rows of one time and successive rows
 
 
-class Asked(NamedTuple):
+class AskedRows(NamedTuple):
     """COLUMN=VALUE: the rows to keep, in one file (imu) or in all that have the column."""
 
     file: str
@@ -30,7 +30,7 @@ class Asked(NamedTuple):
     value: str
 
     @classmethod
-    def of(cls, words: str) -> Asked:
+    def of(cls, words: str) -> AskedRows:
         name, equals, value = words.partition("=")
         file, dot, column = name.strip().rpartition(".")
         if not (equals and column and value.strip()):
@@ -38,7 +38,7 @@ class Asked(NamedTuple):
         return cls(file if dot else "", column, value.strip())
 
 
-def take(table: Table, asked: list[Asked]) -> None:
+def take(table: Table, asked: list[AskedRows]) -> None:
     """Keeps the rows of one sensor: the one asked for, else the first one, with a remark."""
     for one in asked:
         cells = np.array([cell.strip() for cell in table.cells(one.column)])

@@ -94,13 +94,13 @@ def _raw_rig(date: Path, cameras: _Folder) -> Rig:
     up.
     """
     path = date / "calib_cam_to_cam.txt"
-    cam = _Calib(path)
+    cam = _KittiCalib(path)
     first, second = cameras.numbers
     P = [cam.array(f"P_rect_{k:02d}", 3, 4) for k in (first, second)]
     size = cam.array(f"S_rect_{first:02d}", 2)
     R_rect = Poses(_near(path, "R_rect_00", cam.array("R_rect_00", 3, 3)), np.zeros(3))
-    velo = _Calib(date / "calib_velo_to_cam.txt").pose()
-    imu = _Calib(date / "calib_imu_to_velo.txt").pose()
+    velo = _KittiCalib(date / "calib_velo_to_cam.txt").pose()
+    imu = _KittiCalib(date / "calib_imu_to_velo.txt").pose()
     T_LB = se3.compose(se3.compose(se3.compose(_shift(P[0]), R_rect), velo), imu)
     return replace(_rectified(path, P, (int(size[0]), int(size[1]))), T_LB=T_LB)
 
@@ -168,7 +168,7 @@ def _stamp(path: Path, line: int, words: str) -> int:
 def _odometry(folder: Path, asked: Asked, made: Made) -> Streams:
     cameras = _cameras(folder, ODOMETRY_PAIRS)
     path = folder / "calib.txt"
-    calib = _Calib(path)
+    calib = _KittiCalib(path)
     P = [calib.array(f"P{k}", 3, 4) for k in cameras.numbers]
     rig = replace(_rectified(path, P, (0, 0)), T_LB=Poses(AHEAD, np.zeros(3)))
     pairs = images.pairs(folder / cameras.left, folder / cameras.right)
@@ -278,7 +278,7 @@ def _near(path: Path, name: str, R: Floats) -> Floats:
     return se3.nearest_rotation(arrays.rotation(path, name, R))
 
 
-class _Calib:
+class _KittiCalib:
     """A file with lines of NAME: numbers."""
 
     def __init__(self, path: Path) -> None:

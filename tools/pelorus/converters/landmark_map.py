@@ -31,7 +31,7 @@ WORLD = "world"
 ROUNDING = 1e-9  # of the largest variance: rounding that a negative variance may be
 
 
-class Points(NamedTuple):
+class MapPoints(NamedTuple):
     """Landmarks as the file has them; `row` is each one's row in it."""
 
     id: NDArray[np.int64]
@@ -60,7 +60,7 @@ def _without_data(header: Header, known: list[Landmark]) -> Recording:
     return Recording(header, never, none, none, never, nothing, known=known)
 
 
-def _csv(path: Path) -> Points:
+def _csv(path: Path) -> MapPoints:
     table = Table.read(path)
     p = table.numbers(*POSITION)
     if not len(p):
@@ -80,7 +80,7 @@ def _csv(path: Path) -> Points:
             due=f"a column {SIGMA}, or {', '.join(COVARIANCE)}, is expected",
         )
     id = table.integers("id", ID_MAX)
-    return Points(id, p, P, np.arange(len(p)) + table.first_row)
+    return MapPoints(id, p, P, np.arange(len(p)) + table.first_row)
 
 
 def _require_world(path: Path, table: Table) -> None:
@@ -94,7 +94,7 @@ def _require_world(path: Path, table: Table) -> None:
             )
 
 
-def _check(path: Path, points: Points) -> None:
+def _check(path: Path, points: MapPoints) -> None:
     """Refuses duplicate ids, and matrices that are no covariance."""
     _, first, count = np.unique(points.id, return_index=True, return_counts=True)
     if (count > 1).any():

@@ -9,7 +9,7 @@ from pelorus import se3
 from pelorus.converters import ros_frames, ros_motion, ros_positions, ros_wheels
 from pelorus.converters.bag import Bag
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
-from pelorus.converters.ros_motion import IMU, Moving
+from pelorus.converters.ros_motion import IMU, MotionTopics
 from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Readings, Streams, Twists
 from pelorus.converters.transforms import TF, Chain, Tree, bare
@@ -26,7 +26,7 @@ class Topics:
     """The topics that the user names; the others are taken where there is only one."""
 
     cameras: Cameras
-    moving: Moving = field(default_factory=Moving)
+    moving: MotionTopics = field(default_factory=MotionTopics)
     position: str = ""  # of a GNSS receiver
     position_sigma_m: float = 0.0  # 0: as its messages say
     wheels: Beside | None = None  # of an IMU's recording

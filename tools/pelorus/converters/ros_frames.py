@@ -19,7 +19,7 @@ from pelorus import motion
 from pelorus.console import progress
 from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.order import Stamps, in_order, leave_out, sound
-from pelorus.converters.streams import Pictures, Seen
+from pelorus.converters.streams import Pictures, RawTracks
 from pelorus.converters.transforms import bare
 from pelorus.errors import PelorusError
 from pelorus.extras import cv2
@@ -129,7 +129,9 @@ def _partners(topics: list[str], words: tuple[tuple[str, str], ...]) -> list[tup
     return sorted(found)
 
 
-def read(bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]) -> Pictures | Seen:
+def read(
+    bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]
+) -> Pictures | RawTracks:
     """Reads pictures, or tracks."""
     if cameras.tracks:
         return _tracks(bag, cameras.tracks, calibrated, remarks)
@@ -288,7 +290,7 @@ def _deep(where: Path, message: Any) -> NDArray[np.uint16]:
 # --- tracks ---------------------------------------------------------------------------------------
 
 
-def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) -> Seen:
+def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) -> RawTracks:
     if topic not in bag.types:
         raise PelorusError(f"{bag.path}: has no topic {topic}; {bag.listing()}")
     where = bag.path / topic.lstrip("/")
@@ -308,7 +310,7 @@ def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) ->
     tracks.check(bag.path)
     if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
         raise ForeignFileError(bag.path, "an id stands twice in a message", at=topic)
-    return Seen(where, times, tracks)
+    return RawTracks(where, times, tracks)
 
 
 def observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:

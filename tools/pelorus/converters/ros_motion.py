@@ -60,7 +60,7 @@ class Wheels:
 
 
 @dataclass(frozen=True)
-class Moving:
+class MotionTopics:
     """The topics that the user names; others are taken where there is only one."""
 
     twist: str = ""
@@ -81,7 +81,7 @@ class Rows(NamedTuple):
 
 
 def read(
-    bag: Bag, topics: Moving, asked: Asked, tree: Tree, remarks: list[str]
+    bag: Bag, topics: MotionTopics, asked: Asked, tree: Tree, remarks: list[str]
 ) -> Twists | Readings:
     """Reads the motion from the named topics, else from the only ones."""
     found = _alone(bag, topics, asked, remarks)
@@ -113,7 +113,7 @@ def _timing(asked: Asked) -> TwistTiming:
     return TwistTiming.START if asked.timing is None else asked.timing
 
 
-def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists | Readings:
+def _alone(bag: Bag, topics: MotionTopics, asked: Asked, remarks: list[str]) -> Twists | Readings:
     """Reads the motion without the gyro beside twists."""
     named = [topic for topic in (topics.twist, topics.imu) if topic]
     if len(named) + (topics.wheels is not None) > 1:
@@ -136,7 +136,7 @@ def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists
         return _twists(bag, bag.require(topics.twist or twists[0], *TWISTS), asked, remarks)
     if not twists and len(imus) == 1:
         return _imu(bag, imus[0], topics.gyro, remarks)
-    pair = _apart(bag, imus, remarks) if not twists and len(imus) == 2 else None
+    pair = _separate_imu_topics(bag, imus, remarks) if not twists and len(imus) == 2 else None
     if pair is not None:
         return pair
     raise PelorusError(
@@ -229,7 +229,7 @@ def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
     )
 
 
-def _apart(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
+def _separate_imu_topics(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
     """Joins the topics of an accelerometer and a gyro; None if the topics are not these."""
     pair = [_halves(bag, topic, []) for topic in topics]
     forces = [bool(rows.numbers[:, :3].any()) for rows in pair]

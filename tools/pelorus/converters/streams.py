@@ -115,7 +115,7 @@ class Pictures:
 
 
 @dataclass(frozen=True)
-class Seen:
+class RawTracks:
     """Tracks, in the pixels of the calibration's cameras."""
 
     where: Path
@@ -128,7 +128,7 @@ class Streams:
     """Twists or an IMU, and what the cameras saw."""
 
     calibrated: Calibrated
-    frames: Pictures | Seen
+    frames: Pictures | RawTracks
     motion: Twists | Readings
     truth: Trajectory | None = None
     small: list[Reading] = field(default_factory=list)
@@ -138,7 +138,7 @@ class Streams:
     settings: dict[str, float] = field(default_factory=dict)
 
     @property
-    def told(self) -> list[str]:
+    def all_remarks(self) -> list[str]:
         """Returns what the user should know of how the files were read."""
         of_truth = self.truth.remarks if self.truth else ()
         return [*self.remarks, *of_truth, *self.calibrated.remarks]
@@ -215,7 +215,7 @@ def converted(
 
 
 def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
-    remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.told]
+    remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.all_remarks]
     motion = streams.motion
     if isinstance(motion, Twists):
         in_frame = max(_interval_s(t_ns) / _interval_s(motion.t_ns), 1.0)
@@ -368,10 +368,10 @@ def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
     return repeated.moves(t_ns, motion.inertial.t_ns, w - np.median(w, axis=0), None)
 
 
-def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Readings) -> None:
+def _require_overlap(frames: Pictures | RawTracks, t_ns: Times, motion: Twists | Readings) -> None:
     own = _times_of(motion)
     if t_ns[-1] < own[0] or own[-1] < t_ns[0]:
-        where = frames.where if isinstance(frames, Seen) else frames.where[0]
+        where = frames.where if isinstance(frames, RawTracks) else frames.where[0]
         raise ForeignFileError(
             where,
             f"spans {t_ns[0]} to {t_ns[-1]} ns, {motion.where} {own[0]} to {own[-1]} ns: "

@@ -25,7 +25,7 @@ FRAMES_SHOWN = 20
 OPTICAL = "optical"  # in the name of a frame whose z looks forward (REP 103)
 
 
-class Link(NamedTuple):
+class FrameLink(NamedTuple):
     """A link to the parent of a frame."""
 
     parent: str
@@ -56,7 +56,7 @@ class Tree:
 
     def __init__(self, bag: Bag) -> None:
         self.bag = bag
-        self.links: dict[str, Link] = {}
+        self.links: dict[str, FrameLink] = {}
         self.moving: dict[str, str] = {}
         self.double: dict[str, set[str]] = {}
         topics = bag.of_type(*TF)
@@ -84,7 +84,7 @@ class Tree:
         norm = np.linalg.norm(quaternion)
         if child == parent or not np.isfinite(p).all() or not 0.9 < norm < 1.1:
             return
-        link = Link(parent, Poses(Rotation.from_quat(quaternion).as_matrix(), p))
+        link = FrameLink(parent, Poses(Rotation.from_quat(quaternion).as_matrix(), p))
         known = self.links.setdefault(child, link)
         if known.parent == parent and _same(known.T, link.T):
             return

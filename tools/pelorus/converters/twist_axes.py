@@ -45,7 +45,7 @@ def in_body(
         raise PelorusError(f"--twist-in {asked.value}: all six velocities are expected")
     has_place = bool(np.isfinite(poses.p).all())
     if asked is TwistIn.AUTO:
-        asked = _told(twists, poses, remarks) if has_place else TwistIn.BODY
+        asked = _axes_by_poses(twists, poses, remarks) if has_place else TwistIn.BODY
     if asked is TwistIn.POSES:
         if not has_place:
             raise ForeignFileError(
@@ -64,7 +64,7 @@ def _into_body(poses: Poses, x_W: Floats) -> Floats:
     return np.asarray(np.einsum("nji,nj->ni", poses.R, x_W))
 
 
-def _told(twists: Twists, poses: Poses, remarks: list[str]) -> TwistIn:
+def _axes_by_poses(twists: Twists, poses: Poses, remarks: list[str]) -> TwistIn:
     """Returns the axes by the poses, and adds a remark on them."""
     v, w = twists.v_B_mps, twists.w_B_radps
     where = str(twists.where)

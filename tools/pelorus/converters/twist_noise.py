@@ -32,7 +32,7 @@ MAD_TO_SIGMA = 1.4826  # of a normal distribution
 
 
 @dataclass(frozen=True)
-class Spread:
+class TwistSpread:
     """The sigma of one axis, of velocities and of rates."""
 
     velocity_mps: float
@@ -51,18 +51,20 @@ def suggest(recording: Recording) -> tuple[Recording, Finding]:
     if usable.sum() < FRAMES_ENOUGH:
         evidence = f"{int(usable.sum())} frames with tracks enough, {FRAMES_ENOUGH} are expected"
         action = "no suggestion: give the sigmas"
-        return recording, Finding(subject, False, evidence, action, told=False)
+        return recording, Finding(subject, False, evidence, action, is_conclusive=False)
     tau_s = np.diff(recording.frame_t_ns)[usable] * 1e-9
     halves = [visual_motion.estimate(half, camera) for half in _halves(seen)]
     images = _spread(_body(recording, halves[0]), _body(recording, halves[1]), usable, tau_s, 0.5)
     whole = _body(recording, visual_motion.estimate(seen, camera))
     of_reading = _of_reading(recording)
     twists = _spread(whole, recording.body_motion(1), usable, tau_s, of_reading)
-    images = Spread(of_reading * images.velocity_mps, of_reading * images.gyro_radps)
+    images = TwistSpread(of_reading * images.velocity_mps, of_reading * images.gyro_radps)
     return _decide(recording, twists, images, Finding(subject, False, _words(twists, images), ""))
 
 
-def difference_of_a_reading(recording: Recording, fewest: int = FRAMES_ENOUGH) -> Spread | None:
+def difference_of_a_reading(
+    recording: Recording, fewest: int = FRAMES_ENOUGH
+) -> TwistSpread | None:
     """Returns the difference of twists and images as the sigma of a reading.
 
     It is an upper bound of the twists' noise; None where fewer frames have enough tracks.
@@ -82,7 +84,7 @@ def _rounded(sigma: float) -> float:
 
 
 def _decide(
-    recording: Recording, twists: Spread, images: Spread, finding: Finding
+    recording: Recording, twists: TwistSpread, images: TwistSpread, finding: Finding
 ) -> tuple[Recording, Finding]:
     noise, said = recording.header.noise, []
     if noise.velocity_sigma_mps < 0 and twists.velocity_mps > CLEARLY * images.velocity_mps:
@@ -110,7 +112,7 @@ def _of_reading(recording: Recording) -> float:
     return float(k / np.sqrt(independent))
 
 
-def _words(twists: Spread, images: Spread) -> str:
+def _words(twists: TwistSpread, images: TwistSpread) -> str:
     return (
         f"twists and images differ by {twists.velocity_mps:.2g} m/s and {twists.gyro_radps:.2g} "
         f"rad/s per axis and reading, of which the images' own error is {images.velocity_mps:.2g} "
@@ -138,10 +140,12 @@ def _body(recording: Recording, motion_C: Poses) -> Poses:
     return se3.compose(se3.compose(se3.inverse(recording.T_CB), motion_C), recording.T_CB)
 
 
-def _spread(a: Poses, b: Poses, usable: NDArray[np.bool_], tau_s: Floats, factor: float) -> Spread:
+def _spread(
+    a: Poses, b: Poses, usable: NDArray[np.bool_], tau_s: Floats, factor: float
+) -> TwistSpread:
     """Returns the spread of a^-1 b as a twist, times factor; the three axes are pooled."""
     difference = se3.compose(se3.inverse(a.at(usable)), b.at(usable))
     rate = se3.log(difference) / tau_s[:, None]
     axis = factor * MAD_TO_SIGMA * np.median(np.abs(rate - np.median(rate, axis=0)), axis=0)
     rms = np.sqrt(np.mean(axis.reshape(2, 3) ** 2, axis=1))
-    return Spread(float(rms[0]), float(rms[1]))
+    return TwistSpread(float(rms[0]), float(rms[1]))

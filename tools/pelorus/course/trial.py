@@ -99,7 +99,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Options:
+class TrialOptions:
     """Options of the replays: for dead reckoning and Pelorus, and for the course's filter."""
 
     ours: Sequence[str] = ()
@@ -107,7 +107,7 @@ class Options:
 
 
 def carry_out_trial(
-    subject: Subject, reference: Reference, programs: Programs, options: Options, folder: Path
+    subject: Subject, reference: Reference, programs: Programs, options: TrialOptions, folder: Path
 ) -> Trial:
     """Replays the recording; the files of the runs stay in the folder."""
     found = plan_runs(programs, subject.path, options.ours, (COURSE,))

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pelorus import motion, se3
-from pelorus.explain.finding import Cause, Finding, S
+from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.inputs import AXES
-from pelorus.explain.log import Flags, Log, runs, suspect
+from pelorus.explain.log import FilterLog, Flags, runs, suspect
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
@@ -50,7 +50,7 @@ class Steps(NamedTuple):
     by_odometry: Floats  # (n, 6); an IMU has no velocity: there it is the pictures' usual one
 
 
-def contradictions(log: Log) -> Iterator[Finding]:
+def contradictions(log: FilterLog) -> Iterator[Incident]:
     """Yields a finding for each stretch of suspect frames that differs from what was before it."""
     if not len(log.readings):
         return
@@ -60,7 +60,7 @@ def contradictions(log: Log) -> Iterator[Finding]:
             yield found
 
 
-def _stretches(log: Log) -> list[tuple[int, int]]:
+def _stretches(log: FilterLog) -> list[tuple[int, int]]:
     out: list[tuple[int, int]] = []
     for first, last in runs(suspect(log)):
         if out and log.t_ns[first] - log.t_ns[out[-1][1]] < APART_S * S:
@@ -70,7 +70,7 @@ def _stretches(log: Log) -> list[tuple[int, int]]:
     return out
 
 
-def _looked_at(log: Log, first: int, last: int) -> Finding | None:
+def _looked_at(log: FilterLog, first: int, last: int) -> Incident | None:
     begin = log.t_ns[first]
     low = int(np.searchsorted(log.t_ns, begin - (LOOK_BACK_S + LEARN_S) * S))
     lasts_s = min((log.t_ns[last] - begin) / S, LOOK_MOST_S)
@@ -97,7 +97,7 @@ def _looked_at(log: Log, first: int, last: int) -> Finding | None:
     return _jump(log, steps, int(odd[0])) if len(odd) else None
 
 
-def _as_told(log: Log, first: int, last: int) -> Finding | None:
+def _as_told(log: FilterLog, first: int, last: int) -> Incident | None:
     """Returns the supervisor's finding where too few points were seen before to measure one.
 
     It must doubt the odometry, and have agreed with it before.
@@ -116,10 +116,10 @@ def _as_told(log: Log, first: int, last: int) -> Finding | None:
     cause = Cause.TURN_CONTRADICTED if axis >= 3 else Cause.CONTRADICTED
     if axis < 3 and not log.by_imu:
         cause = Cause.SLIP
-    return Finding(cause, int(log.t_ns[first]), int(log.t_ns[last]), words)
+    return Incident(cause, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-def _least_sigma(log: Log, steps: Steps) -> Floats:
+def _least_sigma(log: FilterLog, steps: Steps) -> Floats:
     """Returns (n, 6) lower limits of the differences' sigmas.
 
     They are the usual sigmas of the readings on this drive; some per cent of the motion, for wheels
@@ -150,7 +150,7 @@ def _lasting(off: Floats) -> Floats:
     return out
 
 
-def _jump(log: Log, steps: Steps, k: int) -> Finding:
+def _jump(log: FilterLog, steps: Steps, k: int) -> Incident:
     t = log.t_ns[steps.first :]
     tau_s = float(t[k + 1] - t[k]) / S
     moved = (steps.by_pictures[k] - steps.by_odometry[k]) * tau_s
@@ -158,10 +158,12 @@ def _jump(log: Log, steps: Steps, k: int) -> Finding:
     whose = "IMU" if log.by_imu else "odometry"
     words = f"the body jumped by {m:.2f} m and {deg:.1f} deg from one frame to the next, and the "
     words += f"{whose} tells nothing of it: carried, pushed, hit"
-    return Finding(Cause.JUMP, int(t[k + 1]), int(t[k + 1]), words)
+    return Incident(Cause.JUMP, int(t[k + 1]), int(t[k + 1]), words)
 
 
-def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, int]) -> Finding:
+def _part(
+    log: FilterLog, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, int]
+) -> Incident:
     """Returns the finding that pictures and odometry differ from step k on, with its early
     maximum.
     """
@@ -182,15 +184,15 @@ def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, i
             f"the odometry says {told:.2f} m/s along {AXES[axis]}, the pictures {seen:.2f} m/s: "
             "wheels slip, or what the camera sees moves along"
         )
-        return Finding(Cause.SLIP, begin, end, words, noticed)
+        return Incident(Cause.SLIP, begin, end, words, noticed)
     words = (
         f"the {'gyro' if log.by_imu else 'odometry'} says {told:.3f} rad/s about {AXES[axis - 3]}, "
         f"the pictures {seen:.3f} rad/s"
     )
-    return Finding(Cause.TURN_CONTRADICTED, begin, end, words, noticed)
+    return Incident(Cause.TURN_CONTRADICTED, begin, end, words, noticed)
 
 
-def _end(log: Log, steps: Steps, k: int, lasting: Floats, last: int) -> int:
+def _end(log: FilterLog, steps: Steps, k: int, lasting: Floats, last: int) -> int:
     """Returns when the difference ends, which may be before the doubt; the doubt's end if not
     seen.
     """
@@ -201,7 +203,7 @@ def _end(log: Log, steps: Steps, k: int, lasting: Floats, last: int) -> int:
     return int(log.t_ns[steps.first + end + 1] if known else log.t_ns[last])
 
 
-def measured(log: Log, low: int, high: int) -> Steps:
+def measured(log: FilterLog, low: int, high: int) -> Steps:
     """Returns the steps between the frames from `low` to below `high`."""
     t = log.t_ns[low:high]
     tau = np.diff(t)[:, None] / S
@@ -215,7 +217,7 @@ def measured(log: Log, low: int, high: int) -> Steps:
     return Steps(low, seen, by_odometry)
 
 
-def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Flags]:
+def _by_pictures(log: FilterLog, low: int, high: int, told: Poses) -> tuple[Poses, Flags]:
     """Returns the body's motions by the pictures, and which steps have enough points.
 
     The search starts from the filter's motion, from the odometry's, and from the best fit of the
@@ -251,7 +253,7 @@ def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Fla
     return turned(there, best, T_CB), np.asarray(enough)
 
 
-def _by_filter(log: Log, low: int, high: int) -> Poses:
+def _by_filter(log: FilterLog, low: int, high: int) -> Poses:
     """Returns the motions of the filter's pose from frame to frame; none where a frame was
     refused.
     """
@@ -265,7 +267,7 @@ def _by_filter(log: Log, low: int, high: int) -> Poses:
     return se3.compose(se3.inverse(poses.at(slice(None, -1))), poses.at(slice(1, None)))
 
 
-def _by_odometry(log: Log, t: Times) -> Poses:
+def _by_odometry(log: FilterLog, t: Times) -> Poses:
     """Returns the motions by twists, or by the gyro alone."""
     order = np.argsort(log.reading_ns, kind="stable")
     stamps, readings = log.reading_ns[order], log.readings[order]

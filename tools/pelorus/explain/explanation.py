@@ -14,9 +14,9 @@ import numpy as np
 
 from pelorus import schema
 from pelorus.explain.contradiction import contradictions
-from pelorus.explain.finding import Cause, Finding, S
+from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.inputs import of_inputs, rejected
-from pelorus.explain.log import FEW, Flags, Log, log_of, runs
+from pelorus.explain.log import FEW, FilterLog, Flags, log_of, runs
 from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
 from pelorus.explain.small import of_small
 from pelorus.explain.stamps import of_stamps
@@ -44,8 +44,8 @@ class Episode:
     meanwhile.
     """
 
-    first: Finding
-    others: tuple[Finding, ...]
+    first: Incident
+    others: tuple[Incident, ...]
     spells: tuple[Spell, ...]
     before: str
 
@@ -86,12 +86,12 @@ class Explanation:
         return sum(episode.first.cause is Cause.DIVERGED for episode in self.episodes)
 
     @property
-    def first(self) -> Finding | None:
+    def first(self) -> Incident | None:
         """Returns the first cause of the first episode, else what is wrong throughout."""
         if self.episodes:
             return self.episodes[0].first
         if self.setup:
-            return Finding(Cause.SETTINGS, self.origin_ns, self.end_ns, self.setup[0])
+            return Incident(Cause.SETTINGS, self.origin_ns, self.end_ns, self.setup[0])
         return None
 
     def seconds(self, t_ns: int) -> float:
@@ -158,12 +158,12 @@ class Explanation:
             *(words for _, words in sorted(then)),
         ]
 
-    def _follows(self, one: Finding, first: Finding) -> str:
+    def _follows(self, one: Incident, first: Incident) -> str:
         by_it = one.rank > first.rank and one.from_ns <= first.to_ns + TOGETHER_NS
         why = ", probably by it" if by_it else ""
         return f"{self.seconds(one.from_ns):.2f} s{why}: {one.cause}: {one.words}"
 
-    def _lasting(self, found: Finding) -> str:
+    def _lasting(self, found: Incident) -> str:
         """Returns how long it lasted, in words; empty if it was a moment."""
         seconds = self.seconds(found.to_ns) - self.seconds(found.from_ns)
         return f", {seconds:.1f} s long" if seconds >= LASTS_S else ""
@@ -194,7 +194,7 @@ class Explanation:
             "duration_s": self.seconds(self.end_ns),
         }
 
-    def _finding(self, found: Finding) -> dict[str, Any]:
+    def _finding(self, found: Incident) -> dict[str, Any]:
         return {
             "cause": found.cause,
             "from_s": self.seconds(found.from_ns),
@@ -231,7 +231,7 @@ def explain(messages: Sequence[Message]) -> Explanation:
     return Explanation(log.origin_ns, end_ns, episodes, setup, health, remarks, rest, messages)
 
 
-def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
+def _remarks(log: FilterLog, messages: Sequence[Message]) -> Iterator[str]:
     if not any(log.evidence):
         yield (
             "it holds no EVIDENCE, so it is not known what the supervisor saw: it comes from an "
@@ -248,16 +248,16 @@ def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
         yield f"and {len(texts) - TEXTS_TOLD} remarks more: pelorus info"
 
 
-def divergences(log: Log) -> Iterator[Finding]:
+def divergences(log: FilterLog) -> Iterator[Incident]:
     """Yields frames after which a variance was not positive: the arithmetic failed."""
     for first, last in runs(log.said(NOT_POSITIVE)):
         count = last - first + 1
         words = f"a variance ceased to be positive in {count} frame{'s' * (count > 1)}; the filter "
         words += "went on from its pose and dropped its landmarks"
-        yield Finding(Cause.DIVERGED, int(log.t_ns[first]), int(log.t_ns[last]), words)
+        yield Incident(Cause.DIVERGED, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-def _behind(found: Finding, inputs: Sequence[Finding]) -> Finding:
+def _behind(found: Incident, inputs: Sequence[Incident]) -> Incident:
     """Returns the finding; if the filter noticed it when an input failed, it begins there."""
     if found.noticed_ns is None:
         return found
@@ -266,18 +266,18 @@ def _behind(found: Finding, inputs: Sequence[Finding]) -> Finding:
     return found._replace(from_ns=max(begin, found.from_ns))
 
 
-def _order(found: Finding) -> tuple[int, int]:
+def _order(found: Incident) -> tuple[int, int]:
     return found.from_ns, found.rank
 
 
-def _calm(log: Log, begin_ns: int | None) -> Flags:
+def _calm(log: FilterLog, begin_ns: int | None) -> Flags:
     """Returns the frames before the first event; all where they are few or there is no event."""
     if begin_ns is None:
         return np.ones(len(log.t_ns), bool)
     return np.asarray(log.t_ns < begin_ns)
 
 
-def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterator[Finding]:
+def _unexplained(log: FilterLog, health: TimeLine, found: Sequence[Incident]) -> Iterator[Incident]:
     """Yields spells where the filter was lost and no finding explains it."""
     for spell in health.spells:
         if spell.health < LOST or _near(spell, (*found, *divergences(log))):
@@ -286,20 +286,20 @@ def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterat
         seen = log.column("observations")[meanwhile]
         if len(seen) and np.median(seen) < FEW:
             words = f"{np.median(seen):.0f} points in sight: darkness, or nothing to see"
-            yield Finding(Cause.LOST_TRACKS, spell.from_ns, spell.to_ns, words)
+            yield Incident(Cause.LOST_TRACKS, spell.from_ns, spell.to_ns, words)
         else:
             words = f"the filter was lost: {', '.join(spell.why)}"
-            yield Finding(Cause.LOST, spell.from_ns, spell.to_ns, words)
+            yield Incident(Cause.LOST, spell.from_ns, spell.to_ns, words)
 
 
-def _near(one: Finding | Spell, found: Sequence[Finding]) -> bool:
+def _near(one: Incident | Spell, found: Sequence[Incident]) -> bool:
     return any(
         f.from_ns - APART_NS <= one.to_ns and one.from_ns <= f.to_ns + APART_NS for f in found
     )
 
 
-def _grouped(found: Sequence[Finding]) -> list[list[Finding]]:
-    groups: list[list[Finding]] = []
+def _grouped(found: Sequence[Incident]) -> list[list[Incident]]:
+    groups: list[list[Incident]] = []
     end = 0
     for one in found:
         if groups and one.from_ns <= end + APART_NS:
@@ -311,7 +311,7 @@ def _grouped(found: Sequence[Finding]) -> list[list[Finding]]:
     return groups
 
 
-def _episode(log: Log, group: Sequence[Finding], health: TimeLine) -> Episode:
+def _episode(log: FilterLog, group: Sequence[Incident], health: TimeLine) -> Episode:
     begin = group[0].from_ns
     together = [f for f in group if f.from_ns <= begin + TOGETHER_NS]
     first = min(together, key=lambda f: (f.rank, f.from_ns))
@@ -323,7 +323,7 @@ def _episode(log: Log, group: Sequence[Finding], health: TimeLine) -> Episode:
     return Episode(first, others, spells, _before(log, first.from_ns))
 
 
-def _before(log: Log, t_ns: int) -> str:
+def _before(log: FilterLog, t_ns: int) -> str:
     """Returns figures of the last second before it."""
     rows = (log.arrived_ns < t_ns) & (log.arrived_ns >= t_ns - BEFORE_NS)
     if not rows.any():

@@ -35,7 +35,7 @@ ODD_FLAGS = EvidenceFlag.OUTRIGHT | EvidenceFlag.WAITS | EvidenceFlag.LOCKED
 
 
 @dataclass(frozen=True)
-class Log:
+class FilterLog:
     """A filter's log.
 
     `frames` are in the order of arrival, each with its answer, and with its evidence where the log
@@ -120,14 +120,14 @@ def _moved(first: Pixels, second: Pixels) -> tuple[int, float]:
     return repeated, float(np.median(np.hypot(*way.T))) if len(way) >= FEW else np.nan
 
 
-def log_of(messages: Sequence[Message]) -> Log:
+def log_of(messages: Sequence[Message]) -> FilterLog:
     """Reads a log; raises PelorusError where no frame was answered."""
     frames, reports, poses, evidence = _answers(messages)
     answered = [k for k, report in enumerate(reports) if report is not None]
     if not answered:
         raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
     behind, stamps, readings = _readings(messages)
-    return Log(
+    return FilterLog(
         header_of_messages(messages),
         [frames[k] for k in answered],
         [report for report in reports if report is not None],
@@ -211,7 +211,7 @@ def _sigma(messages: Sequence[Message], *names: str) -> Floats:
     return np.repeat([in_force(messages, name) or 0.0 for name in names], 3)
 
 
-def suspect(log: Log) -> Flags:
+def suspect(log: FilterLog) -> Flags:
     """Returns the frames that the supervisor or the gate found suspect."""
     flags = np.array([0 if e is None else e.flags for e in log.evidence], np.int64)
     matched, gated = log.column("matched"), log.column("gated")

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pelorus.explain.inputs import is_habit, losses
-from pelorus.explain.log import NO_READING, Flags, Log, period
+from pelorus.explain.log import NO_READING, FilterLog, Flags, period
 from pelorus.schema import STATUSES, number
 
 MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
@@ -28,7 +28,7 @@ PERIODS_LATE = 2.0  # behind a frame; its newest reading is normally within one
 DIRECTIONS = ("forward", "sideways", "upward", "roll", "pitch", "yaw")
 
 
-def of_setup(log: Log, calm: Flags) -> Iterator[str]:
+def of_setup(log: FilterLog, calm: Flags) -> Iterator[str]:
     """Yields remarks; `calm` are the frames to judge by: those before the first event."""
     if np.count_nonzero(calm) < FRAMES_LEAST:
         return
@@ -46,7 +46,7 @@ def of_setup(log: Log, calm: Flags) -> Iterator[str]:
         yield f"the front end loses all tracks every {whole_s / len(lost):.1f} s, and begins anew"
 
 
-def refusals(log: Log) -> str:
+def refusals(log: FilterLog) -> str:
     """Returns a remark on refused frames; empty where there are none."""
     status = log.column("status")
     refused = status != 0
@@ -64,11 +64,11 @@ def refusals(log: Log) -> str:
     return words + STATUSES.get(-number_of, f"status {-number_of}")
 
 
-def _share(log: Log, bits: int, calm: Flags) -> float:
+def _share(log: FilterLog, bits: int, calm: Flags) -> float:
     return float(log.said(bits)[calm].mean())
 
 
-def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
+def _noise(log: FilterLog, calm: Flags, gate_told: bool) -> Iterator[str]:
     if log.said(MISFIT)[calm].any():
         last = [e for e, c in zip(log.evidence, calm, strict=True) if c and e is not None]
         usual = np.sqrt(last[-1].usual) if last else np.ones(6)
@@ -85,7 +85,7 @@ def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
         )
 
 
-def _bias(log: Log, calm: Flags) -> str:
+def _bias(log: FilterLog, calm: Flags) -> str:
     """Returns a remark on wheels' bias: a wrong scale is along the way, a turned camera across
     it.
     """
@@ -117,7 +117,7 @@ def _bias(log: Log, calm: Flags) -> str:
     )
 
 
-def _readings(log: Log, calm: Flags) -> str:
+def _readings(log: FilterLog, calm: Flags) -> str:
     """Returns a remark on readings that are missing, refused, or behind the frames."""
     name = "IMU readings" if log.by_imu else "twists"
     behind = log.behind_ns[calm & (log.behind_ns != NO_READING)]
@@ -133,13 +133,13 @@ def _readings(log: Log, calm: Flags) -> str:
     return f"{name} are missing, refused or too old all along: {refused}"
 
 
-def gated_share(log: Log, calm: Flags) -> float:
+def gated_share(log: FilterLog, calm: Flags) -> float:
     """Returns the share of all matches that the gate rejected."""
     matched, gated = (int(log.column(name)[calm].sum()) for name in ("matched", "gated"))
     return gated / matched if matched else 0.0
 
 
-def _gate(log: Log, calm: Flags) -> Iterator[str]:
+def _gate(log: FilterLog, calm: Flags) -> Iterator[str]:
     if (share := gated_share(log, calm)) > GATED_MOST:
         yield (
             f"the gate rejects {share:.0%} of the matches: pixel-sigma too small, wrong "

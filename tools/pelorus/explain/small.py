@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pelorus.explain.finding import Cause, Finding
-from pelorus.explain.log import Log, runs
+from pelorus.explain.incident import Cause, Incident
+from pelorus.explain.log import FilterLog, runs
 from pelorus.frames import Message, Reading
 from pelorus.schema import SENSORS, number
 from pelorus.small_sensors import name_of
@@ -17,7 +17,7 @@ REJECTED = number("reason", "READINGS_REJECTED")
 FRAMES_LEAST = 2  # frames: a single one is no event
 
 
-def of_small(log: Log, messages: Sequence[Message]) -> Iterator[Finding]:
+def of_small(log: FilterLog, messages: Sequence[Message]) -> Iterator[Incident]:
     """Yields stretches of frames with rejected readings, with their sensors and how far off
     wheels read.
     """
@@ -29,10 +29,10 @@ def of_small(log: Log, messages: Sequence[Message]) -> Iterator[Finding]:
             continue
         names = ", ".join(sorted({name_of(m.sensor) for m in meanwhile}))
         words = f"readings of {names} are rejected, or off by more than their sigma"
-        yield Finding(Cause.READINGS_OFF, begin, end, words + _rolled(log, meanwhile))
+        yield Incident(Cause.READINGS_OFF, begin, end, words + _rolled(log, meanwhile))
 
 
-def _rolled(log: Log, readings: Sequence[Reading]) -> str:
+def _rolled(log: FilterLog, readings: Sequence[Reading]) -> str:
     """Returns the forward speed by wheels and by the filter, in words."""
     ahead = [m for m in readings if m.sensor == SENSORS["wheel"] and m.axes & 1]
     poses = [pose for pose in log.poses if pose is not None]

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pelorus.explain.finding import Cause, Finding, S
-from pelorus.explain.log import NO_READING, Log, period
+from pelorus.explain.incident import Cause, Incident, S
+from pelorus.explain.log import NO_READING, FilterLog, period
 from pelorus.layout import Floats
 from pelorus.motion import Times
 
@@ -21,14 +21,14 @@ MAD = 1.4826  # of a normal distribution: sigma over the median absolute deviati
 JITTER_SIGMAS = 8.0  # no chance changes a stamp's lead by more
 
 
-def of_stamps(log: Log) -> Iterator[Finding]:
+def of_stamps(log: FilterLog) -> Iterator[Incident]:
     """Yields all findings on the clocks."""
     yield from clock_steps(log)
     yield from gaps(log)
     yield from backwards(log)
 
 
-def clock_steps(log: Log) -> Iterator[Finding]:
+def clock_steps(log: FilterLog) -> Iterator[Incident]:
     """Yields steps of the frames' stamps against the readings', while they still arrive between
     these.
 
@@ -57,7 +57,7 @@ def clock_steps(log: Log) -> Iterator[Finding]:
         words = (
             f"the stamps of the {whose} step {which} by {abs(by) / S:.3f} s against the {others}'"
         )
-        yield Finding(Cause.CLOCK_STEP, at, at, words)
+        yield Incident(Cause.CLOCK_STEP, at, at, words)
 
 
 def _jitter(ahead: Floats) -> float:
@@ -72,23 +72,23 @@ SAME_FLOW = 3.0  # ratio to the picture's motion between frames; ten periods mak
 MOVES_PX = 1.0  # a smaller motion of the picture shows no time
 
 
-def gaps(log: Log) -> Iterator[Finding]:
+def gaps(log: FilterLog) -> Iterator[Incident]:
     """Yields long gaps without a frame, or without a reading."""
     name = "IMU reading" if log.by_imu else "twist"
     for begin, end, _ in _long(log.reading_ns):
         if _between(log.t_ns, begin, end):  # a gap of both is reported as one of the frames
             words = f"no {name} for {(end - begin) / S:.1f} s"
-            yield Finding(Cause.NO_READINGS, begin, end, words)
+            yield Incident(Cause.NO_READINGS, begin, end, words)
     for begin, end, k in _long(log.t_ns):
         long = f"{(end - begin) / S:.1f} s"
         alone = not _between(log.reading_ns, begin, end)
         if _no_time_passed(log, k):
             whose = "all stamps step" if alone else "the stamps of the frames step"
             words = f"{whose} forward by {long}, and the pictures go on as if no time had passed"
-            yield Finding(Cause.CLOCK_STEP, begin, begin, words)
+            yield Incident(Cause.CLOCK_STEP, begin, begin, words)
             continue
         both = f"neither frames nor {name}s for {long}: a pause, or a step of the clock of both"
-        yield Finding(Cause.NO_FRAMES, begin, end, both if alone else f"no frame for {long}")
+        yield Incident(Cause.NO_FRAMES, begin, end, both if alone else f"no frame for {long}")
 
 
 def _long(t_ns: Times) -> Iterator[tuple[int, int, int]]:
@@ -102,7 +102,7 @@ def _between(t_ns: Times, begin: int, end: int) -> bool:
     return bool(((t_ns > begin) & (t_ns < end)).any())
 
 
-def _no_time_passed(log: Log, k: int) -> bool:
+def _no_time_passed(log: FilterLog, k: int) -> bool:
     around = np.concatenate(
         (log.flow_px[max(k - BEFORE, 0) : k + 1], log.flow_px[k + 2 : k + BEFORE])
     )
@@ -113,7 +113,7 @@ def _no_time_passed(log: Log, k: int) -> bool:
     return usual > MOVES_PX and bool(log.flow_px[k + 1] < SAME_FLOW * usual)
 
 
-def backwards(log: Log) -> Iterator[Finding]:
+def backwards(log: FilterLog) -> Iterator[Incident]:
     """Yields stamps that go back. A step of frames against readings is reported by clock_steps."""
     name = "IMU readings" if log.by_imu else "twists"
     streams = [(log.reading_ns, name)]
@@ -125,4 +125,4 @@ def backwards(log: Log) -> Iterator[Finding]:
             at = int(t[back[0]])
             by_s = int(t[back[0]] - t[back[0] + 1]) / S
             words = f"the stamps of the {whose} go back by {by_s:.3f} s"
-            yield Finding(Cause.CLOCK_STEP, at, at, words)
+            yield Incident(Cause.CLOCK_STEP, at, at, words)

@@ -16,7 +16,7 @@ import numpy as np
 from pelorus.faults.clocks import FRAMES_MIN, UNTOLD, TwoClocks, offset_of, two_clocks
 from pelorus.faults.fit import CLOCK, FOCAL, LEVER, SCALE, TILT, TURN, TURN_SCALE, Body, Fit
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.layout import Floats
@@ -54,20 +54,20 @@ class Agreement:
     clocks: TwoClocks = UNTOLD  # of velocities and of turns separately; none for an IMU
 
     @property
-    def told(self) -> bool:
+    def is_known(self) -> bool:
         return self.frames >= FRAMES_MIN
 
 
-def halved(recording: Recording, seen: Seen, lag: int) -> Seen:
+def halved(recording: Recording, seen: CameraMotion, lag: int) -> CameraMotion:
     """Returns `seen` with estimates from halves of the points, where these give enough frames."""
     return seen.with_halves(recording, lag, int(HALVED_MIN * seen.usable.sum()))
 
 
-def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -> Agreement:
+def agreement(recording: Recording, views: TwoViews, seen: CameraMotion | None = None) -> Agreement:
     """Fits scale, lever and clock; assumes that rotation and units are right. `seen` is the
     views' motion, if it is known already.
     """
-    seen = Seen.of(recording, views) if seen is None else seen
+    seen = CameraMotion.of(recording, views) if seen is None else seen
     if seen.usable.sum() < FRAMES_MIN:
         nan = float("nan")
         return Agreement(
@@ -92,7 +92,7 @@ def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -
     if found is None:
         found = Fit(body.design(recording, seen, at, bias))
     none = place = found
-    turns_told = by_imu or found.tells(TURN_SCALE)
+    turns_known = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
         late = clocks.turns_late_s if clocks.apart else None
         place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
@@ -117,7 +117,7 @@ def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -
         clock_sigma,
         speed,
         1 + float(found.x[TURN_SCALE]),
-        found.known(TURN_SCALE) if turns_told else float("inf"),
+        found.known(TURN_SCALE) if turns_known else float("inf"),
         1 - float(found.x[FOCAL]),
         found.known(FOCAL) if by_imu else float("inf"),
         tilt_rad=tilt[0],
@@ -148,7 +148,7 @@ def _sigma(fit: Fit, by_imu: bool) -> float:
     return max(fit.known(SCALE), fit.image_sigma[SCALE]) if by_imu else fit.known(SCALE)
 
 
-def _body(recording: Recording, seen: Seen) -> tuple[Body, float]:
+def _body(recording: Recording, seen: CameraMotion) -> tuple[Body, float]:
     """Returns the model of the body's motion, and the sigma of its bias."""
     noise = recording.header.noise
     if len(recording.inertial.t_ns):
@@ -177,7 +177,7 @@ def _doubt_by_depth(
     halves = []
     for tracks in by_depth(recording.tracks):
         part = replace(recording, tracks=tracks)
-        seen = Seen.of(part, two_views(tracks, recording.header.camera, views.lag))
+        seen = CameraMotion.of(part, two_views(tracks, recording.header.camera, views.lag))
         if seen.usable.sum() < FRAMES_MIN:
             return 0.0
         fit = Fit(body.design(part, seen, *at))
@@ -201,7 +201,7 @@ def _doubt_by_noise(
     tracks = recording.tracks
     more = np.random.default_rng(1).normal(0, views.sigma_px, tracks.pixels.shape)
     noisy = replace(recording, tracks=replace(tracks, pixels=tracks.pixels + more))
-    seen = Seen.of(noisy, two_views(noisy.tracks, recording.header.camera, views.lag))
+    seen = CameraMotion.of(noisy, two_views(noisy.tracks, recording.header.camera, views.lag))
     if seen.usable.sum() < FRAMES_MIN:
         return 0.0
     if len(recording.inertial.t_ns):

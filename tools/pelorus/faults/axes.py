@@ -15,7 +15,7 @@ import numpy as np
 from pelorus import se3
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
-from pelorus.faults.likelihood import told
+from pelorus.faults.likelihood import with_ratio
 from pelorus.frames import BodyAxes
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -57,7 +57,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     best = int(np.argmin(scores))
     result = duel(errors[0], errors[best], LAG)
     if not result.frames:
-        return recording, Finding(SUBJECT, False, TOO_FEW, "left as given", told=False)
+        return recording, Finding(SUBJECT, False, TOO_FEW, "left as given", is_conclusive=False)
     if best == 0 or not result.clearly_won(RATIO_MAX, SHARE_MIN, Z_MIN):
         return recording, Finding(SUBJECT, False, _quiet(scores), "nothing to mend")
     mended = _turned(recording.T_CB, candidates[best])
@@ -65,7 +65,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"lag-{LAG} reprojection falls from {result.given:.1f} to {result.challenger:.1f} px with "
         f"the axes turned, in {100 * result.share:.0f} % of {result.frames} frames"
     )
-    evidence = told(evidence, result.ratio)
+    evidence = with_ratio(evidence, result.ratio)
     action = f"T_CB turned by {_text(candidates[best])}: body axes are now {name(mended.R)}"
     return recording.with_extrinsic(mended), Finding(SUBJECT, True, evidence, action)
 

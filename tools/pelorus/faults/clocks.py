@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pelorus.faults.fit import CLOCK, TURN_CLOCK, Body, Fit
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -48,7 +48,7 @@ class TwoClocks:
 UNTOLD = TwoClocks()
 
 
-def offset_of(recording: Recording, body: Body, seen: Seen, bias: float) -> float:
+def offset_of(recording: Recording, body: Body, seen: CameraMotion, bias: float) -> float:
     """Returns the frames' offset, s, by least squares from zero and from the greatest
     correlation.
     """
@@ -67,7 +67,7 @@ def offset_of(recording: Recording, body: Body, seen: Seen, bias: float) -> floa
     return max(ends)[1]
 
 
-def two_clocks(recording: Recording, seen: Seen, offset_s: float, bias: float) -> TwoClocks:
+def two_clocks(recording: Recording, seen: CameraMotion, offset_s: float, bias: float) -> TwoClocks:
     """Fits the clocks of velocities and of rates separately, from their common one."""
     ways_s, late_s = offset_s, 0.0
     for _ in range(ROUNDS):
@@ -91,7 +91,7 @@ def _step(fit: Fit, which: int) -> float:
     return float(np.clip(fit.x[which], -STEP_S, STEP_S))
 
 
-def _together(recording: Recording, body: Body, seen: Seen) -> Callable[[float], float]:
+def _together(recording: Recording, body: Body, seen: CameraMotion) -> Callable[[float], float]:
     """Returns a function that correlates the turns of camera and body at an offset, s."""
     own = seen.rates[:, 3:]
 

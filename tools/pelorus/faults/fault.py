@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pelorus.faults.likelihood import told
+from pelorus.faults.likelihood import with_ratio
 
 UNTOLD = "untold"  # no fault, but not called good either
 
@@ -21,9 +21,9 @@ class Fault:
     ratio: float | None = None  # 2 ln of the likelihood ratio with and without it
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """Returns the words, with the likelihood ratio of the fault against none."""
-        return told(self.words, self.ratio)
+        return with_ratio(self.words, self.ratio)
 
     @property
     def lasts(self) -> bool:

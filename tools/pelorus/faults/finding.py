@@ -14,5 +14,5 @@ class Finding:
     found: bool  # whether it is faulty, as far as the data show
     evidence: str  # the numbers
     action: str  # what was done, or why nothing
-    told: bool = True  # whether there was enough to judge by
+    is_conclusive: bool = True  # whether there was enough to judge by
     measured: bool = False  # no fault: something was measured, and written

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.tracks import Indices
@@ -71,7 +71,9 @@ class Body(Protocol):
         NaN where nothing is known.
         """
 
-    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
+    def design(
+        self, recording: Recording, seen: CameraMotion, offset_s: float, bias: float
+    ) -> Design:
         """Returns the design of the usable pairs.
 
         `bias` is the sigma of the velocity's bias, m/s, or of the specific force's, m/s^2.
@@ -182,9 +184,7 @@ class Fit:
         return self.beyond_doubt * sigma
 
     def covariance_known(self, which: Sequence[int]) -> Floats:
-        """Returns the same covariance for several unknowns; infinite-like where the drive shows
-        nothing.
-        """
+        """Returns their covariance likewise; UNTOLD is added where the drive shows nothing."""
         some = np.asarray(which)
         own = self.covariance[np.ix_(some, some)]
         strengths = np.array([self.strength(k) for k in which])

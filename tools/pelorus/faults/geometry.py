@@ -36,7 +36,7 @@ from pelorus.faults.handeye import (
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.likelihood import of_estimate, of_share
 from pelorus.faults.moving import USUAL, Moving
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews
 from pelorus.faults.world_axes import world_axes
@@ -76,7 +76,7 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     """Looks for faults of geometry; `views` are of neighbouring frames."""
     by_imu = len(recording.inertial.t_ns) > 0
     ask = cache(lambda: agreement(recording, views, seen))  # it takes longer than all else
-    seen = Seen.of(recording, views)
+    seen = CameraMotion.of(recording, views)
     wrong = [*_unfit(int(seen.usable.sum()), share_of_fit(views))] or [*_standing(seen, moved)]
     if not wrong:
         seen = halved(recording, seen, views.lag) if by_imu else seen
@@ -88,7 +88,7 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     if wrong:  # moving objects explain it
         return Judged(moves or wrong)
     agreed = ask()
-    if not agreed.told:
+    if not agreed.is_known:
         return Judged(moves)
     faults = moves
     if not moves:  # moving objects look like another scale or place of the camera
@@ -102,10 +102,12 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     return Judged(faults, agreed)
 
 
-def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> Iterator[Fault]:
+def _of_twists(
+    recording: Recording, seen: CameraMotion, views: TwoViews, ask: Ask
+) -> Iterator[Fault]:
     """Yields faults of units, axes and the extrinsic's rotation, by twists."""
     found = hand_eye(recording, views)
-    if not found.told:
+    if not found.is_known:
         yield _untold(found.frames)
         return
     if not (recording.v_B_mps.any() or recording.w_B_radps.any()):
@@ -129,7 +131,7 @@ def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> I
     yield from _in_world(recording, seen) or turned
 
 
-def _in_world(recording: Recording, seen: Seen) -> list[Fault]:
+def _in_world(recording: Recording, seen: CameraMotion) -> list[Fault]:
     """Returns a fault if the velocities are in axes that do not turn with the body."""
     ratio = world_axes(recording, seen)
     if ratio < WORLD_SURE:
@@ -146,7 +148,7 @@ def _in_world(recording: Recording, seen: Seen) -> list[Fault]:
     ]
 
 
-def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
+def _of_imu(recording: Recording, seen: CameraMotion) -> Iterator[Fault]:
     """Yields faults of units, axes and the extrinsic's rotation, by an IMU."""
     body = ImuBody(recording, seen)
     found = imu_axes.measured(recording, seen, body)
@@ -169,7 +171,7 @@ def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
         yield replace(fault, ratio=found.held_against(none) - found.held_against(why))
 
 
-def _at_times(recording: Recording, seen: Seen, body: ImuBody) -> Fault | None:
+def _at_times(recording: Recording, seen: CameraMotion, body: ImuBody) -> Fault | None:
     """Returns a fault if camera and IMU disagree for some of the time only."""
     wrong = platform.disagreeing(recording, seen, body)
     if not wrong.any():
@@ -225,7 +227,7 @@ def _untold(frames: int) -> Fault:
     return Fault(UNTOLD, words, stops=False, grave=False)
 
 
-def _standing(seen: Seen, moved: Callable[[], Moving]) -> Iterator[Fault]:
+def _standing(seen: CameraMotion, moved: Callable[[], Moving]) -> Iterator[Fault]:
     """Yields a fault where the camera stands, for its motion is then noise."""
     if seen.moves < MOVES_SIGMAS and not moved().more_than_usual:
         how = "shakes for some time, and hardly moves" if seen.shakes else "stands all along"
@@ -249,7 +251,7 @@ def _units(found: HandEye) -> Iterator[Fault]:
         ("km/h", ways, 3.6, "velocities: m/s were made of km/h twice"),
     ):
         near = UNIT_NEAR + (0.3 if abs(np.log(unit)) > np.log(10) else 0)
-        if name == "degrees" and not found.turns_told:
+        if name == "degrees" and not found.turns_are_known:
             continue
         if scale > 0 and abs(np.log(scale / unit)) < near:
             shown = f"the images show {scale:.3g} times the {words}"
@@ -266,7 +268,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
     off = angle_between(found.R, given)
     sigmas = off / _sigma_deg(found, given)
     sure = sigmas > SURE_SIGMAS
-    rolled = off > ROLLED_DEG and found.turns_told
+    rolled = off > ROLLED_DEG and found.turns_are_known
     axes = list(_axes(recording, views))
     cosine = float((found.R @ found.heading_B) @ (given @ found.heading_B))
     headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
@@ -308,14 +310,14 @@ def _straight_deg(recording: Recording, found: HandEye) -> float:
 
 
 def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
-    seen = Seen.of(recording, views)
+    seen = CameraMotion.of(recording, views)
     rates = TwistBody(recording).rates(recording.frame_t_ns, 1, 0.0)
     arm = -recording.T_CB.R.T @ recording.T_CB.p
     own = np.where(seen.usable[:, None], seen.rates, np.nan)
     turn = own[:, 3:]
     of_way, of_turn = mounting.best_of_both(
-        mounting.Rates(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn),
-        mounting.Rates(turn, rates[:, 3:]),
+        mounting.MotionPairs(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn),
+        mounting.MotionPairs(turn, rates[:, 3:]),
     )
     won = {
         whose: found

@@ -54,7 +54,7 @@ class HandEye:
     speed_mps: float  # of the camera, by the images
 
     @property
-    def turns_told(self) -> bool:
+    def turns_are_known(self) -> bool:
         """Returns whether the rates of turn are the camera's at any scale.
 
         On a straight way they may be noise, and what fits noise best is no fault.
@@ -62,7 +62,7 @@ class HandEye:
         return abs(self.turn_scale) > TURNS_SIGMAS * self.turn_sigma
 
     @property
-    def told(self) -> bool:
+    def is_known(self) -> bool:
         return self.frames >= FRAMES_ENOUGH
 
 

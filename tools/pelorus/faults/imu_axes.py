@@ -24,7 +24,7 @@ from pelorus.faults.axes import ways
 from pelorus.faults.fit import WITHIN, Design, Fit
 from pelorus.faults.force import NO_BREAKS, by_images, force
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.seen import Motions, Seen
+from pelorus.faults.seen import CameraMotion, Motions
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -93,7 +93,7 @@ class Matrix:
         return float(m @ np.linalg.solve(self.covariance, m)) > LIMIT
 
 
-class Found(NamedTuple):
+class MatrixFit(NamedTuple):
     """A fit, and which of its unknowns are the matrix."""
 
     fit: Fit
@@ -129,7 +129,7 @@ class Measured:
 
 
 def measured(
-    recording: Recording, seen: Seen, body: ImuBody, breaks_s: Floats = NO_BREAKS
+    recording: Recording, seen: CameraMotion, body: ImuBody, breaks_s: Floats = NO_BREAKS
 ) -> Measured | None:
     """Measures both matrices, at the clock offset at which the turns fit best.
 
@@ -186,7 +186,9 @@ def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
     return np.asarray(w @ fit.x[:9].reshape(3, 3).T + fit.x[9:])
 
 
-def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Found | None:
+def _turn(
+    body: ImuBody, seen: CameraMotion, frame_t_ns: np.ndarray, offset_s: float
+) -> MatrixFit | None:
     """Fits the gyro's matrix, with instruments from the images.
 
     They are the other half of the points and the neighbouring frames, which are free of what a gyro
@@ -207,21 +209,23 @@ def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) ->
 def _are_silent(y: Floats, w: Floats, beside: Floats) -> bool:
     """Returns whether the readings are unrelated to what the images show."""
     seen_to_turn = _together(y, beside)
-    return seen_to_turn > max(TURNS_SIGMAS, PART_LEAST * _together(w, _foretold(w, _told(beside))))
+    return seen_to_turn > max(
+        TURNS_SIGMAS, PART_LEAST * _together(w, _predicted(w, _with_bias(beside)))
+    )
 
 
-def _told(own: Floats) -> Floats:
+def _with_bias(own: Floats) -> Floats:
     """Returns the rates with a column for the bias."""
     return np.hstack((own, np.ones((len(own), 1))))
 
 
 def _rows(
-    own: Seen, w: Floats, others: list[Motions], silent: bool
+    own: CameraMotion, w: Floats, others: list[Motions], silent: bool
 ) -> tuple[Floats, Floats, Floats, Floats, Indices]:
     """Returns y, X, Z, the variance and the frames. Unrelated readings count as 0."""
     instruments = np.hstack([other.rates[:, 3:] for other in others])
     at = np.flatnonzero(own.usable & np.isfinite(np.hstack((w, instruments))).all(axis=1))
-    w, told = w[at], _told(_within(instruments[at]))
+    w, told = w[at], _with_bias(_within(instruments[at]))
     expected = w if silent else told @ np.linalg.lstsq(told, w, rcond=None)[0]
     return own.rates[at, 3:], _columns(w), _columns(expected), own.variance[at, 3:], at
 
@@ -240,7 +244,7 @@ def _columns(w: Floats) -> Floats:
     return X
 
 
-def _foretold(w: Floats, told: Floats) -> Floats:
+def _predicted(w: Floats, told: Floats) -> Floats:
     """Returns the rates as predicted by a fit in the other half of the drive."""
     half = len(w) // 2
     first, second = (np.linalg.lstsq(told[k], w[k], rcond=None)[0] for k in
@@ -263,7 +267,7 @@ def _fit(
     variance: Floats,
     beside: list[float],
     at: Indices,
-) -> Found:
+) -> MatrixFit:
     """Fits a matrix with instruments.
 
     By their own noise, where the drive has no motion, least squares would find a zero matrix with a
@@ -272,7 +276,7 @@ def _fit(
     prior = np.diag(np.array([MATRIX] * 9 + beside) ** -2.0)
     fit = Fit(Design(y, X, Z, variance, prior, y, at), BLOCKS)
     by_readings = np.sum([fit.covariance_of(part)[:9, :9] for part in np.moveaxis(noise, 2, 0)], 0)
-    return Found(fit, Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9], by_readings))
+    return MatrixFit(fit, Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9], by_readings))
 
 
 # --- what explains it -----------------------------------------------------------------------------

@@ -32,7 +32,7 @@ from pelorus.faults.fit import (
     joined,
 )
 from pelorus.faults.force import Force, by_gyro, force, mean_rates, rates_of_turn, thinned
-from pelorus.faults.seen import Motions, Seen, slope
+from pelorus.faults.seen import CameraMotion, Motions, slope
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -45,12 +45,12 @@ GYRO_SCALE = 0.005  # sigma: no focal length is known better without it
 class ImuBody:
     """The motion between frames by the readings of an IMU."""
 
-    def __init__(self, recording: Recording, seen: Seen) -> None:
+    def __init__(self, recording: Recording, seen: CameraMotion) -> None:
         self.readings = thinned(_until(recording))
         self.attitudes = by_gyro(self.readings, np.zeros(3))
         self._set_bias(recording.frame_t_ns, seen)
 
-    def _set_bias(self, frame_t_ns: NDArray[np.int64], seen: Seen) -> None:
+    def _set_bias(self, frame_t_ns: NDArray[np.int64], seen: CameraMotion) -> None:
         """Corrects the gyro's attitudes by the bias against the images: their median difference."""
         off = self.turns(frame_t_ns, 0.0) - seen.rates[:, 3:]
         bias = np.nanmedian(off[seen.usable], axis=0)
@@ -77,14 +77,18 @@ class ImuBody:
         frame_s = self.frame_s(frame_t_ns, offset_s)
         return mean_rates(self.readings, frame_s)
 
-    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
+    def design(
+        self, recording: Recording, seen: CameraMotion, offset_s: float, bias: float
+    ) -> Design:
         """Returns the design of the usable pairs, as fit.Body."""
         told = self.force(recording.frame_t_ns, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
         return joined(*(_design(told, arm, own, others, bias) for own, others in seen.pairs()))
 
 
-def _design(told: Force, arm: Floats, seen: Seen, others: list[Motions], bias: float) -> Design:
+def _design(
+    told: Force, arm: Floats, seen: CameraMotion, others: list[Motions], bias: float
+) -> Design:
     """Returns the design; `others` are the instruments."""
     stretches = told.of_stretches()
     g = told.way + np.cross(told.turn, arm)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pelorus import visual_motion
 from pelorus.faults.finding import Finding
-from pelorus.faults.likelihood import of_estimate, told
+from pelorus.faults.likelihood import of_estimate, with_ratio
 from pelorus.frames import TwistTiming
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -51,7 +51,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         evidence = (
             f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are expected"
         )
-        return recording, Finding(SUBJECT, False, evidence, "left as given", told=False)
+        return recording, Finding(SUBJECT, False, evidence, "left as given", is_conclusive=False)
     way = _way(recording, seen_motion.R, given)
     columns = _columns(recording, seen_motion.R, way, apart)
     s, sigma = _regress(seen_motion.p[usable] - way[usable], columns[usable])
@@ -64,7 +64,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"reprojection in {int(turning.sum())} turning frames is {errors[0]:.1f} and "
         f"{errors[1]:.1f} px"
     )
-    evidence = told(evidence, of_estimate(s, 0.0, 1.0, sigma))
+    evidence = with_ratio(evidence, of_estimate(s, 0.0, 1.0, sigma))
     if s - 0.5 < max(SIGMAS_MIN * sigma, MARGIN_MIN):
         return recording, Finding(SUBJECT, False, evidence, "nothing to mend")
     action = f"t_CB {_metres(given.p)} replaced by {_metres(other.p)}"

@@ -29,6 +29,6 @@ def of_share(share: float, count: float, usual: float) -> float:
     return 2 * count * sum(p * float(np.log(p / due)) for p, due in parts if p > 0)
 
 
-def told(words: str, ratio: float | None) -> str:
+def with_ratio(words: str, ratio: float | None) -> str:
     """Returns the words, with the ratio where there is one."""
     return words if ratio is None else f"{words} (2 ln of the likelihood ratio: {ratio:.0f})"

@@ -59,7 +59,7 @@ def held_to_fit(
         findings = [_taken_back(f, wrong[0], axes.SUBJECT, lever.SUBJECT) for f in findings]
         mended = mended.with_extrinsic(given.T_CB)
         found = judged(mended)
-    return mended, [*findings, *_known(found), *(_told(fault) for fault in found.faults)]
+    return mended, [*findings, *_known(found), *(_as_finding(fault) for fault in found.faults)]
 
 
 def _known(found: Judged) -> Iterator[Finding]:
@@ -67,10 +67,10 @@ def _known(found: Judged) -> Iterator[Finding]:
     promise.
     """
     if found.agreed is not None:
-        told = found.agreed.scale_sigma < SCALE_TOLD
-        yield Finding(AGREES, False, known_words(found.agreed), CANNOT, told=told)
+        is_enough = found.agreed.scale_sigma < SCALE_TOLD
+        yield Finding(AGREES, False, known_words(found.agreed), CANNOT, is_conclusive=is_enough)
     elif any(fault.stops for fault in found.faults):
-        yield Finding(AGREES, False, BEHIND, "nothing was changed", told=False)
+        yield Finding(AGREES, False, BEHIND, "nothing was changed", is_conclusive=False)
 
 
 def known_words(agreed: Agreement) -> str:
@@ -92,13 +92,13 @@ def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
     if finding.subject not in subjects or not finding.found:
         return finding
     action = f"left as given: even then it would not fit ({because.words})"
-    return replace(finding, told=False, found=False, action=action)
+    return replace(finding, is_conclusive=False, found=False, action=action)
 
 
-def _told(fault: Fault) -> Finding:
+def _as_finding(fault: Fault) -> Finding:
     if fault.name == UNTOLD:
-        return Finding(AGREES, False, fault.told, "nothing was changed", told=False)
+        return Finding(AGREES, False, fault.sentence, "nothing was changed", is_conclusive=False)
     action = "nothing was changed; the filter can live with it, and pelorus check tells more"
     if fault.grave:
         action = "nothing was changed: mend it where the data or the calibration come from"
-    return Finding(fault.name, True, fault.told, action)
+    return Finding(fault.name, True, fault.sentence, action)

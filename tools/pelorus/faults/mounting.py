@@ -40,7 +40,7 @@ TILT_RAD, LEVER_M = 0.05, 1.0
 
 
 @dataclass(frozen=True)
-class Duel:
+class AxesDuel:
     """The best of all ways against the given axes."""
 
     F: Floats
@@ -73,31 +73,31 @@ class Duel:
         if self.together:
             return True
         if self.by_ways:
-            told = self.effect < -0.5 and self.z > SURE_OF_WAYS
-            return told and self.explained > EXPLAINED_LEAST
+            is_sure = self.effect < -0.5 and self.z > SURE_OF_WAYS
+            return is_sure and self.explained > EXPLAINED_LEAST
         return self.is_far and self.shared > SURE_SHARED
 
 
-STAYS = Duel(np.eye(3), 0.0, float("inf"), 0.0, False, 0.0)
+STAYS = AxesDuel(np.eye(3), 0.0, float("inf"), 0.0, False, 0.0)
 
 
-class Rates:
+class MotionPairs:
     """Rates or velocities by images and twists, and how well each of the 48 ways matches them.
 
-    `seen` (n, 3) by the images in the given body axes, `told` by the twists. For velocities `turns`
+    `seen` (n, 3) by the images in the given body axes, `by_twists` (n, 3). For velocities `turns`
     (n, 3) are the images' own: what correlates with them, a wrong lever, is left out.
     """
 
-    def __init__(self, seen: Floats, told: Floats, turns: Floats | None = None) -> None:
-        good = np.isfinite(seen).all(axis=1) & np.isfinite(told).all(axis=1)
+    def __init__(self, seen: Floats, by_twists: Floats, turns: Floats | None = None) -> None:
+        good = np.isfinite(seen).all(axis=1) & np.isfinite(by_twists).all(axis=1)
         self.enough = bool(good.sum() >= SAMPLES_MIN)
         if not self.enough:
             return
-        self._seen, self._told = seen[good], told[good]
+        self._seen, self._by_twists = seen[good], by_twists[good]
         self._by_ways = turns is not None
         turned = None if turns is None else turns[good]
-        errors = [self._seen - self._told @ F.T for F in ways()]
-        besides = [_beside(self._told @ F.T, turned) for F in ways()]
+        errors = [self._seen - self._by_twists @ F.T for F in ways()]
+        besides = [_beside(self._by_twists @ F.T, turned) for F in ways()]
         first = [_cost(e, beside) for e, beside in zip(errors, besides, strict=True)]
         self._spread = min(first, key=lambda cost: cost[0])[1]
         self._nuisance = besides[0]
@@ -105,19 +105,19 @@ class Rates:
             _cost(e, beside, self._spread)[0] for e, beside in zip(errors, besides, strict=True)
         ]
 
-    def alone(self) -> Duel:
+    def alone(self) -> AxesDuel:
         """Returns the best of all ways."""
         return self.beside(int(np.argmin(self.costs))) if self.enough else STAYS
 
-    def beside(self, k: int) -> Duel:
+    def beside(self, k: int) -> AxesDuel:
         """Returns the k-th of the ways against the given axes."""
         if k == 0:
             return STAYS
-        found = _duel(ways()[k], self._seen, self._told, self._nuisance, self._spread)
+        found = _duel(ways()[k], self._seen, self._by_twists, self._nuisance, self._spread)
         return replace(found, by_ways=self._by_ways)
 
 
-def best_of_both(way: Rates, turn: Rates) -> tuple[Duel, Duel]:
+def best_of_both(way: MotionPairs, turn: MotionPairs) -> tuple[AxesDuel, AxesDuel]:
     """Returns the axes of velocities and of rates of turn.
 
     Each is decided alone where it is significant; otherwise both together for a whole body: a way
@@ -149,11 +149,11 @@ def _index_of(F: Floats) -> int:
     return next(k for k, other in enumerate(ways()) if np.array_equal(other, F))
 
 
-def _beside(told: Floats, turns: Floats | None) -> Floats:
+def _beside(by_twists: Floats, turns: Floats | None) -> Floats:
     """Returns (n, 3, 9) the nuisances: a bias, a small tilt and a wrong lever."""
-    bias = np.tile(np.eye(3), (len(told), 1, 1))
+    bias = np.tile(np.eye(3), (len(by_twists), 1, 1))
     arm = np.zeros_like(bias) if turns is None else se3.skew(turns)
-    return np.concatenate((bias, -TILT_RAD * se3.skew(told), LEVER_M * arm), axis=2)
+    return np.concatenate((bias, -TILT_RAD * se3.skew(by_twists), LEVER_M * arm), axis=2)
 
 
 def _cost(error: Floats, nuisance: Floats, spread: Floats | None = None) -> tuple[float, Floats]:
@@ -180,13 +180,13 @@ def _solved(error: Floats, nuisance: Floats, trust: Floats) -> Floats:
     return np.asarray(np.linalg.solve(A, trusted.T @ error.ravel()))
 
 
-def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Floats) -> Duel:
-    trust = np.ones(told.shape) / spread
+def _duel(F: Floats, seen: Floats, by_twists: Floats, nuisance: Floats, spread: Floats) -> AxesDuel:
+    trust = np.ones(by_twists.shape) / spread
 
     def free(x: Floats) -> Floats:
         return np.asarray(x - nuisance @ _solved(x, nuisance, trust))
 
-    error, d = free(seen - told), free(told - told @ F.T)
+    error, d = free(seen - by_twists), free(by_twists - by_twists @ F.T)
     moved = [np.roll(d, k, axis=0) for k in (*BESIDE, *(-k for k in BESIDE))]
     beside = free(np.mean(moved, axis=0))
     edge = max(BESIDE)
@@ -207,9 +207,9 @@ def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Float
     spread_of = float(np.std(below, ddof=1)) + 1e-12
     z = -float(np.mean(below)) / spread_of * float(np.sqrt(blocks))
     other = ~np.isclose(np.diag(F), 1)
-    left, shown = free(seen - told @ F.T)[:, other], free(seen)[:, other]
+    left, shown = free(seen - by_twists @ F.T)[:, other], free(seen)[:, other]
     same = np.sum(shown * (shown - left) / spread[other], axis=1) * weight
     sums = np.bincount(at, same)
     shared = float(np.sum(sums) / (np.sqrt(blocks) * np.std(sums, ddof=1) + 1e-12))
     share = np.sum(weight[:, None] * left**2) / (np.sum(weight[:, None] * shown**2) + 1e-12)
-    return Duel(F, effect, sigma, z, False, 1 - float(share), shared)
+    return AxesDuel(F, effect, sigma, z, False, 1 - float(share), shared)

@@ -22,7 +22,7 @@ from pelorus.faults.handeye import first_part
 from pelorus.faults.likelihood import of_share
 from pelorus.faults.moving import Moving, moving
 from pelorus.faults.resolution import of_resolution
-from pelorus.faults.seen import Seen, pauses
+from pelorus.faults.seen import CameraMotion, pauses
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
 from pelorus.inertial_survey import longest_run, readings_of
@@ -128,7 +128,7 @@ def _beside_way(fault: Fault, recording: Recording, views: TwoViews, t_ns: Times
         return fault
     if len(t_ns) < 2 or t_ns[np.argmax(np.diff(t_ns)) + 1] > frames[-1]:
         return fault
-    seen = Seen.of(recording, views)
+    seen = CameraMotion.of(recording, views)
     within = pauses(t_ns, frames[:-1], frames[1:])
     way = np.where(seen.usable[:, None], seen.rates[:, :3], 0.0) * seen.tau_s[:, None]
     which = np.cumsum(np.diff(within, prepend=False) & within)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pelorus.faults.force import seconds
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
@@ -26,7 +26,7 @@ QUIET, QUIET_SIGMAS = 0.25, 1.10
 SHOWN = 4
 
 
-def disagreeing(recording: Recording, seen: Seen, body: ImuBody) -> Flags:
+def disagreeing(recording: Recording, seen: CameraMotion, body: ImuBody) -> Flags:
     """Returns (k,) whether the two show different motions from frame k to k + 1.
 
     It is False everywhere if they do so for most of the drive.
@@ -68,7 +68,12 @@ def spans(t_s: Floats, wrong: Flags) -> list[tuple[float, float]]:
 
 
 def _gravity(
-    recording: Recording, seen: Seen, body: ImuBody, middle: Floats, good: Flags, window: int
+    recording: Recording,
+    seen: CameraMotion,
+    body: ImuBody,
+    middle: Floats,
+    good: Flags,
+    window: int,
 ) -> Floats:
     """Returns (k, 3) gravity in the axes of the first reading, at the middle of each window."""
     t, R = seconds(body.readings), body.attitudes

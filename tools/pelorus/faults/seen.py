@@ -27,7 +27,7 @@ BESIDE = (2, 3)  # frames: adjacent pairs share a picture
 
 
 @dataclass(frozen=True)
-class Seen:
+class CameraMotion:
     """The camera's own v and w in body axes as given, (k, 6), their variances, and which are
     usable.
     """
@@ -37,7 +37,9 @@ class Seen:
     usable: NDArray[np.bool_]
     tau_s: Floats
     by_focal: Floats | None = None  # (k, 6) derivative by the logarithm of the focal length
-    halves: tuple[Seen, Seen] | None = None  # by every other point, with independent noise
+    halves: tuple[CameraMotion, CameraMotion] | None = (
+        None  # by every other point, with independent noise
+    )
 
     @property
     def moves(self) -> float:
@@ -55,7 +57,7 @@ class Seen:
         return bool(len(d2)) and float(np.mean(d2 > SHAKES_D2)) > SHAKES_SHARE
 
     @classmethod
-    def of(cls, recording: Recording, views: TwoViews) -> Seen:
+    def of(cls, recording: Recording, views: TwoViews) -> CameraMotion:
         lag, R = views.lag, recording.T_CB.R
         tau = np.asarray(recording.frame_t_ns[lag:] - recording.frame_t_ns[:-lag]) * 1e-9
         rates = se3.log(se3.inverse(views.motion)) / tau[:, None]
@@ -68,7 +70,7 @@ class Seen:
         usable &= tau <= GAP_PERIODS * np.median(tau)
         return cls(in_body, variance, usable, tau)
 
-    def without(self, wrong: NDArray[np.bool_]) -> Seen:
+    def without(self, wrong: NDArray[np.bool_]) -> CameraMotion:
         """Returns the motion without these frames."""
         halves = None
         if self.halves is not None:
@@ -106,7 +108,7 @@ class Seen:
         focal = None if self.by_focal is None else beside(self.by_focal, *BESIDE)
         return Motions(self.beside(), self.slope(), focal)
 
-    def pairs(self) -> list[tuple[Seen, list[Motions]]]:
+    def pairs(self) -> list[tuple[CameraMotion, list[Motions]]]:
         """Returns pairs of a motion to explain, and instruments: the same motion with other
         noise.
         """
@@ -116,7 +118,7 @@ class Seen:
         one, other = self.halves
         return [(one, [other.itself(), beside]), (other, [one.itself(), beside])]
 
-    def with_halves(self, recording: Recording, lag: int, frames_least: int) -> Seen:
+    def with_halves(self, recording: Recording, lag: int, frames_least: int) -> CameraMotion:
         """Returns this with the motion of each half of the points, where these suffice.
 
         Each is also computed with another focal length. Neither turns nor displacements simply
@@ -127,7 +129,7 @@ class Seen:
             camera, fx_px=(1 + LONGER) * camera.fx_px, fy_px=(1 + LONGER) * camera.fy_px
         )
         parts = by_turns(recording.tracks)
-        own, other = ([Seen.of(recording, two_views(part, c, lag)) for part in parts]
+        own, other = ([CameraMotion.of(recording, two_views(part, c, lag)) for part in parts]
                       for c in (camera, longer))  # fmt: skip
         if min(int(half.usable.sum()) for half in own) < frames_least:
             return self

@@ -28,7 +28,7 @@ MAD_TO_SIGMA, WITHIN_SIGMAS, ROUNDS = 1.4826, 4.0, 5
 
 
 @dataclass(frozen=True)
-class Apart:
+class PictureDelay:
     """Delay of the right picture behind the left one, s, and the motion of points meanwhile, px,
     RMS.
     """
@@ -56,7 +56,7 @@ class Apart:
         )
 
 
-def apart(recording: Recording) -> Apart | None:
+def apart(recording: Recording) -> PictureDelay | None:
     """Measures the delay; None with too few data.
 
     The rate is that between adjacent frames, and has noise; the rate between frames farther away
@@ -85,7 +85,7 @@ def apart(recording: Recording) -> Apart | None:
     noise = weight * told * left
     by_frame = np.bincount(tracks.frame[at], noise, tracks.frame_count).astype(np.float64)
     speed = float(np.sqrt(np.average(near.rows[at] ** 2 + near.columns[at] ** 2, weights=weight)))
-    return Apart(by_s, standard_error(by_frame) / power, abs(by_s) * speed)
+    return PictureDelay(by_s, standard_error(by_frame) / power, abs(by_s) * speed)
 
 
 def _beyond_place(x: Floats, place: Floats, weight: Floats) -> Floats:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
-from pelorus.faults.likelihood import told
+from pelorus.faults.likelihood import with_ratio
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
 from pelorus.visual_motion import seen_pairs
@@ -37,8 +37,8 @@ def choose(recording: Recording) -> tuple[Recording, Finding]:
             f"{result.challenger:.2f} px with end, "
             f"smaller in {100 * result.share:.0f} % of {result.frames} frames"
         )
-        evidence = told(evidence, result.ratio if late else None)
+        evidence = with_ratio(evidence, result.ratio if late else None)
     action = f"twist timing is {'end' if late else 'start'}"
     return choices[int(late)], Finding(
-        "twist timing", bool(late), evidence, action, told=result.frames > 0
+        "twist timing", bool(late), evidence, action, is_conclusive=result.frames > 0
     )

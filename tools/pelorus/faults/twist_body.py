@@ -26,7 +26,7 @@ from pelorus.faults.fit import (
     TURN_SCALE,
     Design,
 )
-from pelorus.faults.seen import Seen, beside, pauses, slope
+from pelorus.faults.seen import CameraMotion, beside, pauses, slope
 from pelorus.layout import Floats
 from pelorus.motion import dead_reckoning
 from pelorus.recording import Recording
@@ -96,7 +96,9 @@ class TwistBody:
         """Returns the mean rates between frames, as fit.Body."""
         return self.rates(frame_t_ns, 1, offset_s)[:, 3:]
 
-    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
+    def design(
+        self, recording: Recording, seen: CameraMotion, offset_s: float, bias: float
+    ) -> Design:
         """Returns the design of the usable pairs, as fit.Body.
 
         Instruments keep scale and time free of the twists' noise: the same motion some frames away.
@@ -127,7 +129,7 @@ def _prior(bias: float, turns_late: float) -> Floats:
     return np.diag(sigma**-2)
 
 
-def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
+def _columns(g: Floats, w: Floats, seen: CameraMotion) -> tuple[Floats, Floats]:
     """Returns (k, 6, m) what each unknown adds to (v, w), and the instruments."""
     X = np.zeros((len(g), 6, PARAMETERS))
     X[:, :3, SCALE] = g
@@ -146,7 +148,7 @@ def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
     return X, Z
 
 
-def _slope_beside(told: Floats, seen: Seen) -> Floats:
+def _slope_beside(told: Floats, seen: CameraMotion) -> Floats:
     """Returns the slope by time, by images and twists of neighbouring frames, weighted by
     precision.
 

@@ -13,7 +13,7 @@ import numpy as np
 from pelorus import se3
 from pelorus.faults.fit import BLOCKS_LEAST
 from pelorus.faults.handeye import mean_twists
-from pelorus.faults.seen import BLOCKS, Seen, standard_error
+from pelorus.faults.seen import BLOCKS, CameraMotion, standard_error
 from pelorus.faults.twist_body import TwistBody
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -22,7 +22,7 @@ ROUNDS = 8
 MOVES_SHARE = 0.1  # share of the usual speed by the pictures
 
 
-def world_axes(recording: Recording, seen: Seen) -> float:
+def world_axes(recording: Recording, seen: CameraMotion) -> float:
     """Returns 2 ln of the likelihood ratio of world axes against the given ones; 0 with too few
     data.
     """

@@ -28,7 +28,7 @@ DIAGONAL = [i * (i + 3) // 2 for i in range(6)]
 
 
 @dataclass(frozen=True)
-class Sizes:
+class PoseDistance:
     """Distances between two poses."""
 
     position_m: float = 0.0
@@ -45,7 +45,7 @@ class Difference:
     pose: list[str] = field(default_factory=list)  # fields of POSE with other bits
     report: dict[str, tuple[float, float]] = field(default_factory=dict)  # name: desk, robot
     missing: str = ""  # what the log lacks of the answer
-    sizes: Sizes = Sizes()
+    sizes: PoseDistance = PoseDistance()
 
     @property
     def same(self) -> bool:
@@ -86,16 +86,16 @@ def _reports(robot: Report, desk: Report) -> dict[str, tuple[float, float]]:
     return {name: pair for name, pair in pairs.items() if _bits(pair[0]) != _bits(pair[1])}
 
 
-def _poses(robot: Pose, desk: Pose) -> tuple[list[str], Sizes]:
+def _poses(robot: Pose, desk: Pose) -> tuple[list[str], PoseDistance]:
     if robot == desk:
-        return [], Sizes()
+        return [], PoseDistance()
     words = [
         word
         for name, word in POSE_WORDS.items()
         if _bits(getattr(robot, name)) != _bits(getattr(desk, name))
     ]
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        sizes = Sizes(
+        sizes = PoseDistance(
             _finite(float(np.linalg.norm(robot.p_WB_m - desk.p_WB_m))),
             _finite(_angle_deg(desk.R_WB.T @ robot.R_WB)),
             _finite(_covariance(robot.covariance, desk.covariance)),

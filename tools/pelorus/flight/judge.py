@@ -11,7 +11,7 @@ from pathlib import Path
 from pelorus import ARITHMETIC, __version__
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, differ
-from pelorus.flight.log import NOWHERE, Frame, Log, Loss, Part, frames_of
+from pelorus.flight.log import NOWHERE, Frame, Loss, Part, RobotLog, frames_of
 from pelorus.frames import Config, Header
 from pelorus.replay import Programs, replayed
 from pelorus.settings import describe
@@ -20,7 +20,7 @@ FNV_OFFSET, FNV_PRIME = 2166136261, 16777619
 WITH_ALL_ROOMS = 3  # PLR_SUPERVISE and PLR_KNOWN_MAP
 
 
-class Verdict(IntEnum):
+class BitsVerdict(IntEnum):
     """The exit status."""
 
     SAME = 0
@@ -33,7 +33,7 @@ class Judgement:
     """The verdict on one part."""
 
     part: Part
-    verdict: Verdict = Verdict.SAME
+    verdict: BitsVerdict = BitsVerdict.SAME
     why: str = ""
     differences: list[Difference] = field(default_factory=list)  # one for each answered frame
     desk: Config | None = None
@@ -70,7 +70,7 @@ class Desk:
         return self.programs.float64 if config.real_bytes == 8 else self.programs.float32
 
 
-def judge(log: Log, desk: Desk) -> list[Judgement]:
+def judge(log: RobotLog, desk: Desk) -> list[Judgement]:
     """Judges every part by itself; raises PelorusError where not one can be compared."""
     judgements: list[Judgement] = []
     for part in log.parts:
@@ -81,12 +81,12 @@ def judge(log: Log, desk: Desk) -> list[Judgement]:
     return judgements
 
 
-def verdict_of(judgements: Sequence[Judgement]) -> Verdict:
+def verdict_of(judgements: Sequence[Judgement]) -> BitsVerdict:
     """Returns DIFFERENT if any part is, SAME if all are."""
     found = {judgement.verdict for judgement in judgements}
-    if Verdict.DIFFERENT in found:
-        return Verdict.DIFFERENT
-    return Verdict.NOT_COMPARABLE if Verdict.NOT_COMPARABLE in found else Verdict.SAME
+    if BitsVerdict.DIFFERENT in found:
+        return BitsVerdict.DIFFERENT
+    return BitsVerdict.NOT_COMPARABLE if BitsVerdict.NOT_COMPARABLE in found else BitsVerdict.SAME
 
 
 def fingerprint(version: str, arithmetic: int, build: Config) -> int:
@@ -112,9 +112,9 @@ def of_this_version(build: Config) -> bool:
 def _judge(part: Part, desk: Desk, state: Path | None) -> Judgement:
     why = _obstacle(part, state)
     if why or part.config is None:
-        return Judgement(part, Verdict.NOT_COMPARABLE, why)
+        return Judgement(part, BitsVerdict.NOT_COMPARABLE, why)
     found = _compared(part, desk, state, [])
-    if found.verdict is Verdict.NOT_COMPARABLE:
+    if found.verdict is BitsVerdict.NOT_COMPARABLE:
         return found
     if found.first is not None and part.unanswered:
         without = _compared(part, desk, state, part.unanswered)
@@ -153,7 +153,7 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
     messages = replayed(desk.program(part.config), part.inputs(left_out), options)
     here = next((m for m in messages if isinstance(m, Config) and m.build_fingerprint), None)
     if here is None:
-        return Judgement(part, Verdict.NOT_COMPARABLE, "the replay's filter did not start")
+        return Judgement(part, BitsVerdict.NOT_COMPARABLE, "the replay's filter did not start")
     found = Judgement(part, desk=here, left_out=left_out)
     ours = frames_of(messages)
     absent = {id(frame) for frame in left_out}
@@ -165,7 +165,7 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
             f"{here.max_observations} observations in one"
         )
     if why:
-        found.verdict, found.why = Verdict.NOT_COMPARABLE, why
+        found.verdict, found.why = BitsVerdict.NOT_COMPARABLE, why
         return found
     pairs = zip(theirs, ours, strict=True)
     found.differences = [differ(robot, mine) for robot, mine in pairs if robot.answered]
@@ -200,16 +200,16 @@ def _concluded(found: Judgement) -> Judgement:
     """
     first, loss = found.first, found.loss
     if first is not None and loss is not None:
-        found.verdict = Verdict.NOT_COMPARABLE
+        found.verdict = BitsVerdict.NOT_COMPARABLE
         where = "somewhere" if loss.at == NOWHERE else f"from frame {loss.at} on"
         found.why = (
             f"{where} the robot may have had other inputs than the log holds ({loss.words}); "
             "what comes behind cannot be compared"
         )
     elif first is not None:
-        found.verdict = Verdict.DIFFERENT
+        found.verdict = BitsVerdict.DIFFERENT
     elif lacking := _lacking(found):
-        found.verdict = Verdict.NOT_COMPARABLE
+        found.verdict = BitsVerdict.NOT_COMPARABLE
         found.why = f"the log does not hold {lacking}; what it holds has the same bits"
     return found
 

@@ -131,7 +131,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Log:
+class RobotLog:
     """The parts of a file that contain frames, and remarks on the whole."""
 
     path: Path
@@ -140,7 +140,7 @@ class Log:
     remarks: list[str]
 
 
-def read_log(path: Path) -> Log:
+def read_log(path: Path) -> RobotLog:
     """Reads a log of inputs and outputs; raises PelorusError where it is none, and says what
     would be.
     """
@@ -161,7 +161,7 @@ def read_log(path: Path) -> Log:
         remarks.append("goes on behind END; that was not read")
     if not counts.clean:
         remarks.append(f"the log is damaged: {counts.damaged} frames, {counts.missing} missing")
-    return Log(path, parts, frames, remarks)
+    return RobotLog(path, parts, frames, remarks)
 
 
 def frames_of(messages: Iterable[Message]) -> list[Frame]:

@@ -15,7 +15,7 @@ from pelorus.explain.log import log_of
 from pelorus.frames import Message
 from pelorus.report.about import tables_of
 from pelorus.report.footage import CAPTION, Footage
-from pelorus.report.page import Answer, Event, Table
+from pelorus.report.page import Answer, Event, PageTable
 from pelorus.report.spectra import drawings
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def with_setup(answer: Answer, messages: Sequence[Message]) -> Answer:
 def of_explanation(
     found: Explanation,
     title: str,
-    tables: Sequence[Table] = (),
+    tables: Sequence[PageTable] = (),
     facts: str = "",
 ) -> Answer:
     """Returns the answer to an explanation of a log."""
@@ -106,7 +106,7 @@ def of_comparison(
     lines: Sequence[str],
     found: Explanation,
     pictures: Sequence[tuple[str, str, Path]],
-    tables: Sequence[Table] = (),
+    tables: Sequence[PageTable] = (),
 ) -> Answer:
     """Returns the answer of a report.
 
@@ -127,10 +127,10 @@ def of_comparison(
         [*_why(found.verdict), _sentence(found.lines()[0]), *lines, *found.setup],
         changes=_settings(found.verdict),
         events=_events(found),
-        tables=[Table("Runs", rows, meaning), *tables],
+        tables=[PageTable("Runs", rows, meaning), *tables],
         pictures=pictures,
         commands=commands,
-        lists=[("Health", compared.main.health.told(compared.origin_ns))],
+        lists=[("Health", compared.main.health.lines(compared.origin_ns))],
     )
 
 
@@ -163,7 +163,7 @@ def of_check(found: Checked, title: str, found_in: Explanation | None) -> Answer
         lines=[*found.verdict.doubts, *found.changes],
         changes=settings,
         events=[] if found_in is None else _events(found_in),
-        tables=[Table("Before and after", rows)] if found.rows else [],
+        tables=[PageTable("Before and after", rows)] if found.rows else [],
         lists=[
             *([("Health", ["with these settings", *found.spells])] if found.spells else []),
             ("All remarks", ["what was looked at", *_remarks(found)]),

@@ -12,7 +12,7 @@ from pelorus.explain.explanation import Explanation
 from pelorus.frames import Config, Message
 from pelorus.relative_error import Drift, drifts
 from pelorus.report.curves import BESIDE
-from pelorus.report.page import Table
+from pelorus.report.page import PageTable
 from pelorus.report.words import NONE, number
 from pelorus.settings import describe
 
@@ -22,7 +22,7 @@ DRIFT = (
 )
 
 
-class Told(NamedTuple):
+class NamedLog(NamedTuple):
     """A log with its name."""
 
     name: str
@@ -31,7 +31,7 @@ class Told(NamedTuple):
     messages: Sequence[Message]
 
 
-def drift_table(logs: Sequence[Told]) -> list[Table]:
+def drift_table(logs: Sequence[NamedLog]) -> list[PageTable]:
     """Returns a table of drift by length; none where no log has a truth."""
     by_log = {
         log.name: {drift.length_m: drift for drift in drifts(log.accuracy)}
@@ -47,7 +47,7 @@ def drift_table(logs: Sequence[Told]) -> list[Table]:
     for length in lengths:
         cells = [_cells(found.get(length)) for found in by_log.values()]
         rows.append([f"{length:g} m", *itertools.chain(*cells)])
-    return [Table("Drift by length (RPE)", rows, DRIFT, folded=True)]
+    return [PageTable("Drift by length (RPE)", rows, DRIFT, folded=True)]
 
 
 def _cells(drift: Drift | None) -> list[str]:
@@ -57,17 +57,19 @@ def _cells(drift: Drift | None) -> list[str]:
     return [*(f"{x:.3g}" for x in figures), str(drift.starts)]
 
 
-def side_by_side(first: Told, second: Told) -> list[Table]:
+def side_by_side(first: NamedLog, second: NamedLog) -> list[PageTable]:
     """Returns tables of both logs' figures, and of the settings in which they differ."""
     head = ("", first.name, BESIDE)
     mine, theirs = dict(_figures(first)), dict(_figures(second))
-    tables = [Table("Side by side", [head, *((key, x, theirs[key]) for key, x in mine.items())])]
+    tables = [
+        PageTable("Side by side", [head, *((key, x, theirs[key]) for key, x in mine.items())])
+    ]
     if settings := list(_settings(first, second)):
-        tables.append(Table("Settings that differ", [head, *settings]))
+        tables.append(PageTable("Settings that differ", [head, *settings]))
     return tables
 
 
-def _figures(log: Told) -> Iterator[tuple[str, str]]:
+def _figures(log: NamedLog) -> Iterator[tuple[str, str]]:
     cause = log.found.first
     yield "first cause", "nothing" if cause is None else str(cause.cause)
     yield "events", str(len(log.found.episodes))
@@ -82,7 +84,7 @@ def _figures(log: Told) -> Iterator[tuple[str, str]]:
         yield title, number(figures.get(key))
 
 
-def _settings(first: Told, second: Told) -> Iterator[tuple[str, ...]]:
+def _settings(first: NamedLog, second: NamedLog) -> Iterator[tuple[str, ...]]:
     mine, theirs = (_in_force(log.messages) for log in (first, second))
     for id in sorted(mine.keys() | theirs.keys()):
         here, there = mine.get(id), theirs.get(id)

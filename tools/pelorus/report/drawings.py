@@ -15,7 +15,7 @@ TICKS = 5
 DECADES_MOST = 8  # below the largest value; smaller ones are drawn as nothing
 
 
-class Axis:
+class PlotAxis:
     """Maps values to pixels along one side."""
 
     def __init__(self, low: float, high: float, span: tuple[float, float], log: bool) -> None:
@@ -58,8 +58,8 @@ def plot(
         return ""
     high = float(values.max())
     low = max(float(values.min()), high * 10.0**-DECADES_MOST) if log[1] else min(0.0, values.min())
-    across = Axis(float(x[0]), float(x[-1]), (LEFT, WIDTH - RIGHT), log[0])
-    up = Axis(low, high * (1 if log[1] else 1.05), (HEIGHT - BOTTOM, TOP), log[1])
+    across = PlotAxis(float(x[0]), float(x[-1]), (LEFT, WIDTH - RIGHT), log[0])
+    up = PlotAxis(low, high * (1 if log[1] else 1.05), (HEIGHT - BOTTOM, TOP), log[1])
     out = [_grid(across, up, units)]
     for k, (name, y) in enumerate(lines):
         with np.errstate(invalid="ignore"):
@@ -75,7 +75,7 @@ def plot(
     return _svg(WIDTH, HEIGHT, "".join(out))
 
 
-def _grid(across: Axis, up: Axis, units: tuple[str, str]) -> str:
+def _grid(across: PlotAxis, up: PlotAxis, units: tuple[str, str]) -> str:
     out = []
     for tick in across.ticks():
         x = float(across.at(tick))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 from pelorus.explain.explanation import Explanation
-from pelorus.explain.log import Log, log_of
+from pelorus.explain.log import FilterLog, log_of
 from pelorus.extras import extra
 from pelorus.frames import Message
 from pelorus.motion import Times, nearest
@@ -102,7 +102,7 @@ def footage(
 # --- which moments --------------------------------------------------------------------------------
 
 
-def moments(log: Log, found: Explanation) -> dict[int, str]:
+def moments(log: FilterLog, found: Explanation) -> dict[int, str]:
     """Returns frames by number, with a reason: before and after each event begins, its worst,
     and some evenly.
     """
@@ -178,7 +178,7 @@ def _of_folder(folder: Path) -> _Source:
     return _Source(folder, t_ns, len(names), (images.gray(by_name[name]) for name in names))
 
 
-def _frames(source: _Source, log: Log) -> NDArray[np.int64]:
+def _frames(source: _Source, log: FilterLog) -> NDArray[np.int64]:
     """Returns the log's frame of each picture, -1 where it has none."""
     count = len(log.t_ns)
     if source.t_ns is None:
@@ -205,7 +205,7 @@ def _frames(source: _Source, log: Log) -> NDArray[np.int64]:
 
 
 class _Artist:
-    def __init__(self, log: Log) -> None:
+    def __init__(self, log: FilterLog) -> None:
         self._log = log
 
     def draw(self, picture: Gray, k: int, where: Path) -> bytes:

@@ -37,7 +37,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """A table of text cells; the first row is its head."""
 
     title: str
@@ -66,7 +66,7 @@ class Answer:
     lines: Sequence[str] = ()
     changes: Sequence[str] = ()  # settings, as in a config file
     events: Sequence[Event] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[PageTable] = ()
     pictures: Sequence[tuple[str, str, Path]] = ()  # title, caption, PNG
     moments: Sequence[tuple[float, str, bytes]] = ()  # s since the first frame, words, WebP
     about_moments: str = ""
@@ -134,7 +134,7 @@ def _event(event: Event) -> str:
     )
 
 
-def _table(table: Table) -> str:
+def _table(table: PageTable) -> str:
     head, *rows = table.rows
     cells = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     many = len(head) > COLUMNS_MOST  # then a phone shows a row as a list, with the names

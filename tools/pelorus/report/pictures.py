@@ -38,7 +38,7 @@ from pelorus.style import (
 CURVE_MIN = 2  # frames: one point is no curve
 
 
-class Picture(NamedTuple):
+class ReportPicture(NamedTuple):
     """A file `name`.png; without a caption it is not on the page."""
 
     name: str
@@ -47,19 +47,19 @@ class Picture(NamedTuple):
     draw: Callable[[], Figure]
 
 
-def pictures(compared: Comparison) -> list[Picture]:
+def pictures(compared: Comparison) -> list[ReportPicture]:
     """Returns the pictures in the page's order; a curve needs two frames."""
-    seen = Picture("top-view", "", "", partial(top_view.draw, compared))
+    seen = ReportPicture("top-view", "", "", partial(top_view.draw, compared))
     out = [*_map(compared), seen]
     if len(compared.main.frames.t_ns) < CURVE_MIN:
         return out
     if compared.has_course:
         words = f"{COVARIANCE} {WHOLE_MAP.format(ids=compared.whole_map.ids)}"
         draw = partial(covariance, compared)
-        out.append(Picture("covariance", "Trace of the covariance", words, draw))
+        out.append(ReportPicture("covariance", "Trace of the covariance", words, draw))
     own = compared.accuracy.get(OWN)
     if own is not None and len(own.t_ns) >= CURVE_MIN and not compared.main.poses_given:
-        out.append(Picture("hero", "", "", partial(hero, compared)))
+        out.append(ReportPicture("hero", "", "", partial(hero, compared)))
     return out
 
 
@@ -75,7 +75,7 @@ WHOLE_MAP = (
 )
 
 
-def _map(compared: Comparison) -> list[Picture]:
+def _map(compared: Comparison) -> list[ReportPicture]:
     grid = compared.grid
     if grid is None:
         return []
@@ -85,7 +85,7 @@ def _map(compared: Comparison) -> list[Picture]:
         "it with other settings, and writes it for nav2's map_server."
     )
     title = f"{compared.subject.title}: {grid.plane.why}"
-    return [Picture("map", "Free and occupied", words, partial(picture.draw, grid, title))]
+    return [ReportPicture("map", "Free and occupied", words, partial(picture.draw, grid, title))]
 
 
 # --- errors and the band that the covariance promises ---------------------------------------------

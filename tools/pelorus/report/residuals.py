@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import se3
-from pelorus.explain.log import Log
+from pelorus.explain.log import FilterLog
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
 
@@ -47,7 +47,7 @@ class _View(NamedTuple):
 NOTHING = Residuals(np.empty((0, 4)), np.empty((0, 4)))
 
 
-def residuals_of(log: Log, k: int) -> Residuals:
+def residuals_of(log: FilterLog, k: int) -> Residuals:
     """Returns the residuals of frame k."""
     own = _camera_pose(log, k)
     frames = [j for j in range(max(k - BEFORE, 0), k) if log.poses[j] is not None]
@@ -71,7 +71,7 @@ def residuals_of(log: Log, k: int) -> Residuals:
     return Residuals(seen[near], off[near])
 
 
-def residuals(log: Log) -> Residuals:
+def residuals(log: FilterLog) -> Residuals:
     """Returns the residuals of frames evenly over the log."""
     count = len(log.frames)
     chosen = np.unique(np.linspace(0, count - 1, min(FRAMES_MOST, count)).round().astype(int))
@@ -106,7 +106,7 @@ class _Sums:
         return p.astype(np.float64), np.asarray(told)
 
 
-def _camera_pose(log: Log, k: int) -> Poses | None:
+def _camera_pose(log: FilterLog, k: int) -> Poses | None:
     """Returns world to left camera."""
     pose = log.poses[k]
     if pose is None:
@@ -116,7 +116,7 @@ def _camera_pose(log: Log, k: int) -> Poses | None:
     return se3.compose(T_CB, se3.inverse(T_WB))
 
 
-def _view(log: Log, j: int, ids: NDArray[np.int64]) -> _View:
+def _view(log: FilterLog, j: int, ids: NDArray[np.int64]) -> _View:
     T_CW = _camera_pose(log, j)
     assert T_CW is not None
     _, at, there = np.intersect1d(ids, log.frames[j].ids.astype(np.int64), return_indices=True)
@@ -125,7 +125,7 @@ def _view(log: Log, j: int, ids: NDArray[np.int64]) -> _View:
     return _View(at[good], pixels[good], T_CW)
 
 
-def _rows(log: Log, view: _View) -> tuple[Floats, Floats]:
+def _rows(log: FilterLog, view: _View) -> tuple[Floats, Floats]:
     """Returns (n, 4, 3) and (n, 4): linear equations of the point by uL, vL, uR and vR, in
     pixels.
     """
@@ -141,7 +141,7 @@ def _rows(log: Log, view: _View) -> tuple[Floats, Floats]:
     return A, y
 
 
-def _about(log: Log, view: _View, p_W: Floats) -> tuple[Floats, Floats]:
+def _about(log: FilterLog, view: _View, p_W: Floats) -> tuple[Floats, Floats]:
     """Returns (n, 4, 3) the pixels' derivatives by the point, and (n, 4) seen minus expected.
 
     Zero where the point is behind the camera.
@@ -163,7 +163,7 @@ def _about(log: Log, view: _View, p_W: Floats) -> tuple[Floats, Floats]:
     return J * keep[:, None, None], np.where(keep[:, None], off, 0.0)
 
 
-def _projected(log: Log, p_W: Floats, T_CW: Poses) -> Floats:
+def _projected(log: FilterLog, p_W: Floats, T_CW: Poses) -> Floats:
     camera = log.header.camera
     x, y, z = se3.apply(T_CW, p_W).T
     z = np.where(z > NEAR_M, z, np.nan)

@@ -51,7 +51,7 @@ class Box(NamedTuple):
         return Box(middle - half / 2, middle + half / 2)
 
 
-class View(NamedTuple):
+class TopView(NamedTuple):
     """The plane, and everything in its coordinates (n, 2)."""
 
     plane: Plane
@@ -63,7 +63,7 @@ class View(NamedTuple):
     box: Box
 
 
-def view(compared: Comparison) -> View:
+def view(compared: Comparison) -> TopView:
     """Chooses the plane and the picture's limits."""
     main = compared.accuracy.get(OWN)
     looked_at = plane.choose(compared.subject.header.body_axes, compared.main.trajectory.poses)
@@ -76,7 +76,9 @@ def view(compared: Comparison) -> View:
     if main:  # known landmarks are in the truth's world, the picture in the estimate's
         known = se3.apply(main.A, known)
     landmarks = looked_at.flat(points.p_W_m[shown])
-    return View(looked_at, paths, truth, looked_at.flat(known), landmarks, int((~shown).sum()), box)
+    return TopView(
+        looked_at, paths, truth, looked_at.flat(known), landmarks, int((~shown).sum()), box
+    )
 
 
 def _limits(paths: dict[str, Floats], truth: Floats | None) -> Box:
@@ -108,7 +110,7 @@ def draw(compared: Comparison) -> Figure:
     return figure
 
 
-def fill(axes: Axes, seen: View, width_to_height: float) -> None:
+def fill(axes: Axes, seen: TopView, width_to_height: float) -> None:
     """Draws into a panel of the given shape."""
     dots: dict[str, Any] = {"color": GREEN, "marker": ".", "linestyle": "none"}
     size = 3 if len(seen.landmarks) > FEW else 7
@@ -137,7 +139,7 @@ def fill(axes: Axes, seen: View, width_to_height: float) -> None:
     axes.set_ylabel(seen.plane.up.label)
 
 
-def _mark_ends(axes: Axes, seen: View) -> None:
+def _mark_ends(axes: Axes, seen: TopView) -> None:
     path = seen.paths[OWN]
     style: dict[str, Any] = {
         "color": PURPLE,

@@ -62,7 +62,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
         _lens(camera, sizes[k] if k < len(sizes) else [0, 0]) for k, camera in enumerate(cameras)
     ]
     known = [
-        several.Camera((f"cam{k}",), lens, se3.inverse(T))
+        several.RigCamera((f"cam{k}",), lens, se3.inverse(T))
         for k, (lens, T) in enumerate(zip(lenses, poses, strict=True))
     ]
     rig = several.rig(content.path, known, asked)

@@ -42,7 +42,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
     by_socket = _sockets(content)
     placed = _placed(by_socket)
     cameras = [
-        several.Camera((f"CAM_{chr(ord('A') + k)}", str(k)), _lens(by_socket[k]), T)
+        several.RigCamera((f"CAM_{chr(ord('A') + k)}", str(k)), _lens(by_socket[k]), T)
         for k, T in placed.items()
     ]
     if len(cameras) < 2:

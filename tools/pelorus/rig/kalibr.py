@@ -76,7 +76,7 @@ def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
     if len(cameras) == 2 and not asked:
         return pair(cameras[0], cameras[1])
     known = [
-        several.Camera((camera.at, str(camera.content.get("rostopic", ""))), _lens(camera), T)
+        several.RigCamera((camera.at, str(camera.content.get("rostopic", ""))), _lens(camera), T)
         for camera, T in zip(cameras, _chained(cameras), strict=True)
     ]
     chosen = several.pair(content.path, known, asked)

@@ -50,7 +50,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
     if len(cameras) < 2:
         raise ForeignFileError(content.path, "has one camera", due="two are expected")
     known = [
-        several.Camera((f"cam{k}",), _lens(camera), se3.inverse(pose(camera, "T_SC")))
+        several.RigCamera((f"cam{k}",), _lens(camera), se3.inverse(pose(camera, "T_SC")))
         for k, camera in enumerate(cameras)
     ]
     rig = several.rig(content.path, known, asked)

@@ -196,7 +196,7 @@ def _content(path: Path) -> Named:
     return Named(path, foreign.yaml_words(path, words))
 
 
-class Kind(NamedTuple):
+class CalibrationKind(NamedTuple):
     """A program's calibration, with its number of files."""
 
     name: str
@@ -212,32 +212,40 @@ def _opencv(contents: list[Named], lens: LensModel | None, _: Sequence[str]) -> 
 
 # Tested in this order: names that several programs use come last.
 KINDS = (
-    Kind("Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _, of: kalibr.camchain(c[0], of)),
-    Kind("sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, *_: kalibr.pair(*c)),
-    Kind(
+    CalibrationKind(
+        "Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _, of: kalibr.camchain(c[0], of)
+    ),
+    CalibrationKind(
+        "sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, *_: kalibr.pair(*c)
+    ),
+    CalibrationKind(
         "camera_info of ROS",
         camera_info.is_camera_info,
         (2,),
         lambda c, lens, _: camera_info.pair(c[0], c[1], lens),
     ),
-    Kind("ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, *_: orb_slam.read(c[0])),
-    Kind(
+    CalibrationKind(
+        "ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, *_: orb_slam.read(c[0])
+    ),
+    CalibrationKind(
         "VINS-Fusion's configuration",
         lambda content: vins.is_config(content) or vins.is_camera(content),
         (1, 2, 3),
         lambda c, *_: vins.read(c),
     ),
-    Kind(
+    CalibrationKind(
         "Basalt's calibration", basalt.is_calibration, (1,), lambda c, _, of: basalt.read(c[0], of)
     ),
-    Kind("OKVIS's configuration", okvis.is_config, (1,), lambda c, _, of: okvis.read(c[0], of)),
-    Kind("SVO's or maplab's rig", svo.is_rig, (1,), lambda c, _, of: svo.read(c[0], of)),
-    Kind(
+    CalibrationKind(
+        "OKVIS's configuration", okvis.is_config, (1,), lambda c, _, of: okvis.read(c[0], of)
+    ),
+    CalibrationKind("SVO's or maplab's rig", svo.is_rig, (1,), lambda c, _, of: svo.read(c[0], of)),
+    CalibrationKind(
         "DepthAI's calibration",
         depthai.is_calibration,
         (1,),
         lambda c, _, of: depthai.read(c[0], of),
     ),
-    Kind("a ZED's .conf", zed.is_conf, (1,), lambda c, *_: zed.read(c[0])),
-    Kind("OpenCV's stereo calibration", opencv.is_opencv, (1, 2), _opencv),
+    CalibrationKind("a ZED's .conf", zed.is_conf, (1,), lambda c, *_: zed.read(c[0])),
+    CalibrationKind("OpenCV's stereo calibration", opencv.is_opencv, (1, 2), _opencv),
 )

@@ -25,7 +25,7 @@ SAME_FOCAL = 0.05  # relative difference of two cameras of one kind
 APART_MAX_RAD = radians(30.0)
 
 
-class Camera(NamedTuple):
+class RigCamera(NamedTuple):
     """A camera of several; `T` maps points of a common frame to it."""
 
     names: tuple[str, ...]  # in the file: cam0, its topic
@@ -45,7 +45,7 @@ class Chosen(NamedTuple):
     remarks: tuple[str, ...] = ()
 
 
-def rig(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Rig:
+def rig(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str] = ()) -> Rig:
     """Returns the rig of the chosen pair; the frame that all share is its body."""
     chosen = pair(path, cameras, asked)
     first, second = cameras[chosen.first], cameras[chosen.second]
@@ -56,7 +56,7 @@ def rig(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Rig
     return replace(found, topics=ordered, remarks=chosen.remarks)
 
 
-def pair(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Chosen:
+def pair(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str] = ()) -> Chosen:
     """Returns the two that the user asks for by name, else the first two that are alike."""
     if asked:
         return Chosen(*_asked(path, cameras, asked))
@@ -78,7 +78,7 @@ def pair(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Ch
     return Chosen(first, second, (remark,))
 
 
-def _asked(path: Path, cameras: Sequence[Camera], asked: Sequence[str]) -> tuple[int, int]:
+def _asked(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str]) -> tuple[int, int]:
     found = []
     for name in asked:
         of_name = [k for k, camera in enumerate(cameras) if name in camera.names]
@@ -95,7 +95,7 @@ def _asked(path: Path, cameras: Sequence[Camera], asked: Sequence[str]) -> tuple
     return found[0], found[1]
 
 
-def _alike(one: Camera, other: Camera) -> bool:
+def _alike(one: RigCamera, other: RigCamera) -> bool:
     a, b = one.lens, other.lens
     same_size = (a.width_px, a.height_px) == (b.width_px, b.height_px)
     off = abs(a.intrinsics[0] / b.intrinsics[0] - 1)

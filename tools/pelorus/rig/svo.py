@@ -68,7 +68,7 @@ def _imu(content: Named) -> ImuModel:
     )
 
 
-def _camera(one: Named, k: int) -> several.Camera:
+def _camera(one: Named, k: int) -> several.RigCamera:
     inner = one.object("camera")
     inner.word("type", ("pinhole",))
     size = int(inner.number("image_width")), int(inner.number("image_height"))
@@ -76,7 +76,7 @@ def _camera(one: Named, k: int) -> several.Camera:
     model, D = _distortion(inner)
     lens = Lens(model, (fx, fy, cx, cy), D, *size)
     label = str(inner.content.get("label", ""))
-    return several.Camera((f"cam{k}", label), lens, se3.inverse(pose(one, ON_BODY)))
+    return several.RigCamera((f"cam{k}", label), lens, se3.inverse(pose(one, ON_BODY)))
 
 
 def _distortion(camera: Named) -> tuple[LensModel, tuple[float, ...]]:

@@ -52,7 +52,7 @@ WINDOW_BYTES = 2048  # half of the board's receive ring
 
 
 @dataclass
-class Outcome:
+class StreamResult:
     """The result of a stream."""
 
     poses: list[Pose] = field(default_factory=list)  # one a frame
@@ -83,7 +83,7 @@ class Streamer:
         on_message: Callable[[Message], None] = lambda _: None,
     ) -> None:
         """Takes a link; `on_message` gets all that the log gets, in the same order."""
-        self.outcome = Outcome()
+        self.outcome = StreamResult()
         self.reader = Reader()
         self._link = link
         self._log = None if log is None else FlightLog(log)
@@ -100,7 +100,7 @@ class Streamer:
         self._under_way = False
         self._board_is_new = False  # it reported a start, and has not been set up yet
 
-    def run(self, messages: Iterable[Message]) -> Outcome:
+    def run(self, messages: Iterable[Message]) -> StreamResult:
         """Sends everything; END goes last, whether it is among the messages or not."""
         try:
             self.greet()
@@ -129,7 +129,7 @@ class Streamer:
                 lambda: self._end_heard is not None, min(END_AGAIN_S, deadline - time.monotonic())
             )
         self._await_quiet()
-        self.outcome = Outcome(texts=self.outcome.texts, boots=self.outcome.boots)
+        self.outcome = StreamResult(texts=self.outcome.texts, boots=self.outcome.boots)
         self.reader.counts = Counts()  # of this drive alone
         self._sequence = 1
         self._end_heard = None

@@ -16,14 +16,14 @@ from pelorus.recording import Recording
 from pelorus.simulation import imu as sensor
 from pelorus.simulation import smooth
 from pelorus.simulation.drive import Drive, exp
-from pelorus.simulation.imu import Imu, ImuFaults, Sensed, StartGiven
+from pelorus.simulation.imu import ImuFaults, Sensed, SimulatedImu, StartGiven
 
 
 class ImuDrive(NamedTuple):
     """The options on which an IMU depends."""
 
     way: smooth.Way
-    imu: Imu
+    imu: SimulatedImu
     faults: ImuFaults
     bias_gyro_sigma_radps: float
 

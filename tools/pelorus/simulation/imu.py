@@ -41,7 +41,7 @@ class StartGiven(StrEnum):
 
 
 @dataclass(frozen=True)
-class Imu:
+class SimulatedImu:
     """An IMU instead of twists. Noises are as in Kalibr and data sheets."""
 
     imu_rate_hz: float = setting(
@@ -130,7 +130,7 @@ class ImuFaults:
         "x,y,z", "What stands where x, y and z should, for example y,-x,z.", "X,Y,Z", None
     )
 
-    def check(self, imu: Imu) -> None:
+    def check(self, imu: SimulatedImu) -> None:
         """Refuses contradictory options, by the option's name."""
         settings.check(self)
         for part in (imu, self):
@@ -151,7 +151,7 @@ class ImuFaults:
         return out
 
 
-NO_IMU = Imu()
+NO_IMU = SimulatedImu()
 NO_FAULTS = ImuFaults()
 
 
@@ -165,7 +165,7 @@ class Sensed(NamedTuple):
 
 
 def read(
-    imu: Imu,
+    imu: SimulatedImu,
     faults: ImuFaults,
     bias_gyro_sigma: float,
     true: Inertial,

@@ -93,23 +93,23 @@ class Mishaps:
             usual = given == getattr(NO_MISHAPS, name)
             require(name, given, usual or not an_imu, "twists, so no --imu-rate beside it,")
 
-    def true_camera(self, told: Camera) -> Camera:
+    def true_camera(self, given: Camera) -> Camera:
         """Returns the camera that makes the images, given the HEADER's."""
         focal = 1 + self.focal_error_percent / 100
         return replace(
-            told,
-            fx_px=focal * told.fx_px,
-            fy_px=focal * told.fy_px,
-            baseline_m=(1 + self.baseline_error_percent / 100) * told.baseline_m,
+            given,
+            fx_px=focal * given.fx_px,
+            fy_px=focal * given.fy_px,
+            baseline_m=(1 + self.baseline_error_percent / 100) * given.baseline_m,
         )
 
-    def true_extrinsic(self, told: Poses) -> Poses:
+    def true_extrinsic(self, given: Poses) -> Poses:
         """Returns T_CB of the camera that makes the images: turned about its own centre."""
         if not self.camera_turned_deg:
-            return told
+            return given
         about_each = np.radians(self.camera_turned_deg) / np.sqrt(3.0)
         turn = exp(np.zeros((1, 3)), np.full((1, 3), about_each)).R[0]
-        return Poses(rotate(turn, told.R.T).T, rotate(turn, told.p))
+        return Poses(rotate(turn, given.R.T).T, rotate(turn, given.p))
 
     def readings(self, t_ns: Times, v: Floats, w: Floats) -> tuple[Floats, Floats]:
         """Returns the recorded twists."""
@@ -161,7 +161,7 @@ class Mishaps:
 NO_MISHAPS = Mishaps()
 
 
-class Drift:
+class TrackDrift:
     """Drift of each track: a random walk, alike in both images."""
 
     def __init__(self, count: int, sigma: float, chance: np.random.Generator) -> None:

@@ -33,7 +33,7 @@ def white(sigma: float, count: int, chance: np.random.Generator) -> Floats:
 
 
 @dataclass
-class Tracker:
+class SimulatedTracker:
     """Gives landmarks ids: kept while one is seen without a break, a new one afterwards.
 
     With `keep_ids` a landmark has one permanent id (its number), so loops close.

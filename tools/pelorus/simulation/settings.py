@@ -53,7 +53,7 @@ DEGREES = Rule(lambda x: -20 <= x <= 20, "a number of degrees from -20 to 20")
 TIME = Rule(lambda x: 0 <= x < math.inf, "a number of seconds, not negative")
 
 
-class Setting(NamedTuple):
+class OptionField(NamedTuple):
     """The description of a field."""
 
     help: str
@@ -82,10 +82,10 @@ def setting(
     A Span becomes two options, -from and -for; without a default of its own its mishap does not
     happen unless its beginning is given.
     """
-    return field(default=default, metadata={"setting": Setting(help, unit, rule)})
+    return field(default=default, metadata={"setting": OptionField(help, unit, rule)})
 
 
-def settings_of(given: Any) -> dict[str, Setting]:
+def settings_of(given: Any) -> dict[str, OptionField]:
     """Returns the settings of a dataclass or its instance, by the field's name."""
     return {f.name: f.metadata["setting"] for f in fields(given) if "setting" in f.metadata}
 

@@ -29,8 +29,8 @@ from pelorus.se3 import Poses
 from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.simulation import by_imu, scene, sensors, settings, smooth
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, exp, rotate, stood
-from pelorus.simulation.imu import NO_FAULTS, NO_IMU, Imu, ImuFaults, Sensed
-from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
+from pelorus.simulation.imu import NO_FAULTS, NO_IMU, ImuFaults, Sensed, SimulatedImu
+from pelorus.simulation.mishaps import NO_MISHAPS, Flags, Mishaps, TrackDrift
 from pelorus.simulation.readings import Sensing, read
 from pelorus.simulation.settings import (
     AT_LEAST_ONE,
@@ -113,7 +113,7 @@ class Options:
     stop: Span | None = setting(None, "From then on the robot rests.")
     mishaps: Mishaps = NO_MISHAPS
     readings: Mapping[str, Sensing] = field(default_factory=dict)  # of small sensors, by name
-    imu: Imu = NO_IMU
+    imu: SimulatedImu = NO_IMU
     imu_faults: ImuFaults = NO_FAULTS
 
     def check(self) -> None:
@@ -346,7 +346,7 @@ def _small_readings(options: Options, way: Drive, chances: _Chances) -> list[Rea
 def _observe(
     options: Options, t_ns: Times, poses: Poses, points: Floats, chances: _Chances
 ) -> tuple[Tracks, Flags]:
-    tracker = sensors.Tracker(
+    tracker = sensors.SimulatedTracker(
         options.landmarks,
         options.observations,
         options.loss,
@@ -394,7 +394,7 @@ class _Eye:
         moves = chances["moving"].random(len(points)) < mishaps.moving
         self._moves = moves[:, None]
         self._ways = mishaps.ways(t_ns, poses, chances["moving_ways"])
-        self._drift = Drift(len(points), mishaps.track_drift, chances["drift"])
+        self._drift = TrackDrift(len(points), mishaps.track_drift, chances["drift"])
         self._tau_s = np.diff(t_ns, prepend=t_ns[:1]) * 1e-9
 
     def look(self, k: int) -> scene.View:

@@ -110,7 +110,7 @@ class Viewer(Protocol):
     def end(self) -> None: ...
 
 
-class Drive:
+class ShownDrive:
     """Hands messages on to viewers as moments, in their order."""
 
     def __init__(
@@ -171,7 +171,7 @@ class Drive:
 
 def show(messages: Sequence[Message], viewers: Sequence[Viewer]) -> None:
     """Shows a whole log, with its truth moved to the estimate's start."""
-    drive = Drive(viewers, _truth(messages))
+    drive = ShownDrive(viewers, _truth(messages))
     for message in messages:
         drive.take(message)
     drive.end()

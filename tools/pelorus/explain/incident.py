@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A finding: something that went wrong, with its beginning and end."""
+"""An incident: something that went wrong, with its beginning and end."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Cause(StrEnum):
     SETTINGS = "settings"
 
 
-class Finding(NamedTuple):
-    """A finding in a log.
+class Incident(NamedTuple):
+    """An incident in a log.
 
     `words` describe it without its time. `noticed_ns` is when the filter itself noticed it, where
     that is later than it began.
