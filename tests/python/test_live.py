@@ -26,7 +26,7 @@ from pelorus.online.diagnosis import Level, Status
 from pelorus.recording import Recording
 from pelorus.rig.read import Calibrated
 from pelorus.se3 import Poses
-from pelorus.simulation.imu import Imu as SimulatedImu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import messages_of
 from rendered import SMALL
