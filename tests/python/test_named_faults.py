@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from converted import Converted, Run
+from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import ALIKE, OF_RECORDINGS, found_in, of_times, piece
@@ -41,7 +42,8 @@ def test_a_clean_recording_has_no_faults(simulated: Recording) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "strength"), [(n, k) for n in OF_RECORDINGS for k in range(1 if n in ALIKE else 3)]
+    ("name", "strength"),
+    [(n, k) for n in OF_RECORDINGS for k in draws(range(1 if n in ALIKE else 3))],
 )
 def test_a_fault_is_named(simulated: Recording, name: str, strength: int) -> None:
     change, due = OF_RECORDINGS[name]
@@ -158,7 +160,7 @@ def test_points_that_come_back_elsewhere_are_slots_beyond_chance(
     assert Jumps(1, 75, again, elsewhere).are_slots == slots
 
 
-@pytest.mark.parametrize("strength", range(3))
+@pytest.mark.parametrize("strength", draws(range(3)))
 @pytest.mark.parametrize("name", ["time-unit", "time-order", "time-gap"])
 def test_a_fault_of_the_clock_is_named(name: str, strength: int) -> None:
     messages = of_times(drive(60), strength, name)

@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from converted import Run
+from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from pelorus.check import clock, scale, search, tuning, verdict
@@ -121,12 +122,14 @@ WALK = replace(
 
 @pytest.mark.parametrize(
     ("speed_varies", "bias_mps", "error", "grade", "words"),
-    [
-        (0.0, 0.05, 0.02, "care", "cannot tell the scale of the stereo pair from a bias"),
-        (0.3, 0.0, 0.02, "care", "baseline, focal length or wheels' radius"),
-        (0.3, 0.0, 0.0, "good", ""),
-    ],
-    ids=["hidden by a bias", "told", "right"],
+    draws(
+        [
+            (0.0, 0.05, 0.02, "care", "cannot tell the scale of the stereo pair from a bias"),
+            (0.3, 0.0, 0.02, "care", "baseline, focal length or wheels' radius"),
+            (0.3, 0.0, 0.0, "good", ""),
+        ]
+    ),
+    ids=draws(["hidden by a bias", "told", "right"]),
 )
 def test_a_verdict_is_no_better_than_what_the_drive_tells_of_the_scale(
     speed_varies: float,
