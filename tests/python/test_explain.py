@@ -27,7 +27,7 @@ from pelorus.explain.explanation import LINES
 from pelorus.explain.incident import Cause
 from pelorus.explain.log import runs
 from pelorus.frames import Header, Message, Pose, Report, Stereo, Twist
-from pelorus.frames import SimulatedImu as ImuReadings
+from pelorus.frames import Imu as ImuReadings
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.simulation.imu import SimulatedImu

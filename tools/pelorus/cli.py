@@ -28,6 +28,7 @@ COMMANDS = (
     "report",
     "map",
     "course",
+    "live",
     "stream",
     "compare",
 )

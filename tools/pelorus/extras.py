@@ -23,6 +23,9 @@ EXTRAS = {
     "matplotlib": ("drawings (.png) need matplotlib", "figures"),
     "rosbags": ("bags need rosbags", "ros"),
     "pyulog": ("logs of PX4 need pyulog", "px4"),
+    "pymavlink": ("MAVLink needs pymavlink", "mavlink"),
+    "depthai": ("an OAK needs depthai", "oak"),
+    "pyrealsense2": ("a RealSense needs pyrealsense2", "realsense"),
     "pyproj": ("places on the earth need pyproj", "geodetic"),
 }
 

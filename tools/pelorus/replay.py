@@ -162,6 +162,6 @@ def run_program(program: Path, recording: Path, options: Sequence[str]) -> tuple
     if done.returncode != 0:
         how = f"status {done.returncode}" if done.returncode > 0 else f"signal {-done.returncode}"
         said = stderr.replace(f"{program.name}: ", "").strip() or "it said nothing"
-        failure = NothingUsefulError if done.returncode == 1 else PelorusError
-        raise failure(f"{recording}: {program.name} ended with {how}:\n{said}")
+        raised = NothingUsefulError if done.returncode == 1 else PelorusError
+        raise raised(f"{recording}: {program.name} ended with {how}:\n{said}")
     return stdout, stderr

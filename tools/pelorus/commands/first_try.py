@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import typer
-from rich.markup import escape
 
-from pelorus.console import out, step, steps
+from pelorus.commands.another import run_command
+from pelorus.console import step, steps
 from pelorus.errors import Existing, PelorusError, made, resolved
 
 STEPS_OF_CHECK, STEPS_OF_REPORT = 5, 3  # theirs load slowly
@@ -64,15 +64,6 @@ def _format_of(source: Path) -> str:
     )
 
 
-def _run(*words: str) -> int:
-    """Runs another command as the user could; returns its exit status."""
-    from pelorus.application import application  # noqa: PLC0415 - it imports the commands
-
-    out.print(f"[bold]$ pelorus {escape(' '.join(words))}[/]")
-    status = application(words[:1])(args=list(words), standalone_mode=False)
-    return status if isinstance(status, int) else 0
-
-
 @app.command(
     name="try",
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
@@ -110,12 +101,12 @@ def _all(
     if kind:
         step("converting")
         recording = into / f"{name}.plr"
-        if status := _run("convert", kind, str(source), str(recording), *own, *force):
+        if status := run_command("convert", kind, str(source), str(recording), *own, *force):
             return status
     elif own:
         raise PelorusError(f"{' '.join(own)}: {source} needs no conversion")
     tuned = into / "tuned.conf"
-    status = _run("check", str(recording), "--out", str(tuned), *force)
+    status = run_command("check", str(recording), "--out", str(tuned), *force)
     settings = ("--config", str(tuned)) if status == 0 and tuned.is_file() else ()
-    _run("report", str(recording), "--out", str(into), *settings, *force)
+    run_command("report", str(recording), "--out", str(into), *settings, *force)
     return status

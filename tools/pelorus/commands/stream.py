@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import signal
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -16,8 +16,9 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from pelorus import packed_file
 from pelorus.commands.choices import PROGRAMS
 from pelorus.commands.compare import compare_log
+from pelorus.commands.watching import VIEW, watching
 from pelorus.console import err, one_line, out
-from pelorus.errors import Existing, PelorusError, writing
+from pelorus.errors import PelorusError, writing
 from pelorus.flight.judge import BitsVerdict
 from pelorus.frames import Kind, Message, Pose
 from pelorus.robot.emulator import MACHINES
@@ -47,13 +48,7 @@ def stream(
         help="Keep what both sides said, as a recording: replayed, it gives the robot's bits. Cut "
         "short, it is whole up to there; as OUT.plr.zst up to the last 32 KB.",
     ),
-    view: str | None = typer.Option(
-        None,
-        "--view",
-        metavar="spawn|URL|OUT.rrd",
-        help="Show it in Rerun while it runs: in a viewer that is started, one that runs already, "
-        "or a file; as pelorus view does of a log.",
-    ),
+    view: str | None = VIEW,
     compare: bool = typer.Option(
         False,
         "--compare",
@@ -113,7 +108,7 @@ def stream(
                 _ended_in_order(),
                 open_target(to, image) as link,
                 _log_file(log_path) as log,
-                _viewer(view) as watch,
+                watching(view) as watch,
                 _display(messages) as show,
             ):
                 streamer = Streamer(link, log, show, answer, watch)
@@ -173,25 +168,6 @@ def _log_file(path: Path | None) -> Iterator[BinaryIO | None]:
     finally:
         with suppress(OSError):  # what could not be written has been told
             stream.close()
-
-
-@contextmanager
-def _viewer(where: str | None) -> Iterator[Callable[[Message], None]]:
-    if where is None:
-        yield lambda _: None
-        return
-    from pelorus.view.drive import ShownDrive  # noqa: PLC0415 - scipy loads slowly
-    from pelorus.view.in_rerun import InRerun  # noqa: PLC0415
-
-    file = Path(where) if where.endswith(".rrd") else None
-    if file is not None:
-        Existing.keep(file)
-    spawn = where == "spawn"
-    drive = ShownDrive([InRerun(file, None if spawn or file else where, spawn)])
-    try:
-        yield drive.take
-    finally:
-        drive.end()
 
 
 class _Display:

@@ -58,6 +58,18 @@ class Lens:
     def sized(self, width_px: int, height_px: int) -> Lens:
         return replace(self, width_px=width_px, height_px=height_px)
 
+    def scaled(self, width_px: int, height_px: int) -> Lens:
+        """Returns the lens of pictures whose pixels are larger or smaller squares of the same
+        picture; ValueError where they cannot show the same."""
+        if not self.width_px or width_px * self.height_px != height_px * self.width_px:
+            own = f"{self.width_px} x {self.height_px}"
+            raise ValueError(f"pictures of {width_px} x {height_px} px are no scaled {own}")
+        scale = width_px / self.width_px
+        fx, fy, cx, cy = self.intrinsics
+        cx, cy = (cx + 0.5) * scale - 0.5, (cy + 0.5) * scale - 0.5
+        intrinsics = fx * scale, fy * scale, cx, cy
+        return replace(self, intrinsics=intrinsics, width_px=width_px, height_px=height_px)
+
     @property
     def K(self) -> Floats:
         fx, fy, cx, cy = self.intrinsics
