@@ -65,7 +65,7 @@ class Wrong:
             return replace(message, t_ns=message.t_ns + round(self.late_s * 1e9))
         return message
 
-    def due(self) -> Floats:
+    def expected(self) -> Floats:
         """Returns the corrections that are expected of the filter: plr_calibration_error."""
         out = np.zeros(len(PARTS))
         out[:2] = 1 / (1 + self.baseline) - 1, 1 / (1 + self.focal) - 1
@@ -134,7 +134,7 @@ def row_of(messages: list[Message], wrong: Wrong) -> list[float]:
     told = last_calibrated(messages)
     if told is None:
         return row + [np.nan] * 5
-    error = told.corrected - wrong.due()
+    error = told.corrected - wrong.expected()
     bits = [bool(told.estimated >> k & 1) for k in range(len(PARTS))]
     left = np.where(bits, np.abs(error) * [part.scale for part in PARTS], np.nan)
     ratio = np.abs(error[bits]) / told.sigma[bits]

@@ -161,7 +161,7 @@ class Table:
             raise ForeignFileError(
                 self.path,
                 f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}",
-                due=f"there are: {there}{hint}",
+                expected=f"there are: {there}{hint}",
             )
 
     def numbers(self, *names: str) -> Floats:

@@ -133,5 +133,5 @@ class Tracks:
             raise ForeignFileError(
                 source,
                 f"a frame has {fullest} observations",
-                due=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
+                expected=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
             )

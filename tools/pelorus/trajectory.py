@@ -82,7 +82,7 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
             path,
             f"has {columns} numbers",
             at=f"line {sound.rows[0].line}",
-            due=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
+            expected=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
         )
     if in_ns is None:
         in_ns = arrays.are_ns(sound.numbers[:, 0])
@@ -127,7 +127,7 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
         raise ForeignFileError(
             path,
             f"names the columns {', '.join(names[:POSE_COLUMNS])}",
-            due="time, position and quaternion (x y z w, or w first) are expected, in that "
+            expected="time, position and quaternion (x y z w, or w first) are expected, in that "
             "order or "
             "the quaternion before the position",
         )
@@ -179,7 +179,7 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
         raise ForeignFileError(
             path,
             f"rows of {columns} numbers",
-            due=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
+            expected=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
         )
     return read_stamped(path)
 
@@ -248,7 +248,7 @@ def read_kitti(path: Path) -> Poses:
             path,
             f"has {len(rows[0].cells)} cells",
             at=f"line {rows[0].line}",
-            due=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
+            expected=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
         )
     numbers = foreign.numbers(path, rows, KITTI_COLUMNS)
     matrices = numbers.reshape(-1, 3, 4)
@@ -257,7 +257,7 @@ def read_kitti(path: Path) -> Poses:
     if off.max() > 1e-2:
         at = f"line {rows[int(off.argmax())].line}"
         raise ForeignFileError(
-            path, "holds no rotation", at=at, due="[R | p] is expected, row by row"
+            path, "holds no rotation", at=at, expected="[R | p] is expected, row by row"
         )
     return Poses(se3.nearest_rotation(R), matrices[:, :, 3])
 
@@ -281,7 +281,7 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
         whose = times
     else:
         raise ForeignFileError(
-            path, "KITTI poses carry no times", due="give --recording or --times"
+            path, "KITTI poses carry no times", expected="give --recording or --times"
         )
     if len(poses.p) > len(t_ns):
         raise ForeignFileError(path, f"{len(poses.p)} poses, but {whose} has {len(t_ns)} times")

@@ -72,7 +72,7 @@ class HalvesApart:
         return max(self.by_way.values(), default=float("nan"))
 
     @property
-    def due(self) -> float:
+    def expected(self) -> float:
         """Returns the ratio expected of white noise: the largest of four is a sigma above their
         mean.
         """

@@ -128,6 +128,6 @@ def _fitted(by_lag: dict[int, float], growth: Callable[[Floats], Floats]) -> Flo
     lags = np.array([lag for lag, sigma in by_lag.items() if np.isfinite(sigma)], np.float64)
     if len(lags) < 2:
         return np.full(2, np.nan)
-    due = np.array([by_lag[int(lag)] ** 2 for lag in lags])
+    expected = np.array([by_lag[int(lag)] ** 2 for lag in lags])
     columns = np.stack((np.ones(len(lags)), growth(lags)), axis=-1)
-    return np.asarray(np.linalg.lstsq(columns, due, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(columns, expected, rcond=None)[0])

@@ -197,7 +197,7 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
                 listing,
                 f"holds {' '.join(cells)[:60]!r}",
                 at=f"line {line}",
-                due="a time in ns, a file are expected",
+                expected="a time in ns, a file are expected",
             )
         path = data / cells[1]
         found = there.pop(path.stem, None)  # a picture may be another kind of file

@@ -60,7 +60,7 @@ class Ground:
             raise ForeignFileError(
                 path,
                 f"a place lies {np.abs(found).max() * 1e-3:.4g} km from the first one",
-                due=f"at most {LOCAL_MAX_M * 1e-3:g} km are expected: is there a row without "
+                expected=f"at most {LOCAL_MAX_M * 1e-3:g} km are expected: is there a row without "
                 "a fix?",
             )
         remarks.append(
@@ -96,7 +96,7 @@ def localise(table: Table, ground: Ground) -> None:
         raise ForeignFileError(
             table.path,
             f"{' and '.join(GRID)}: in which grid?",
-            due="--crs EPSG:326NN is expected for zone NN north of UTM on WGS 84, EPSG:327NN "
+            expected="--crs EPSG:326NN is expected for zone NN north of UTM on WGS 84, EPSG:327NN "
             "for south",
         )
     if by_degrees != (ground.system().is_geographic if ground.crs else True):

@@ -141,7 +141,9 @@ def _stamps(path: Path, count: int) -> Times:
     lines = [line.strip() for line in foreign.text(path).splitlines() if line.strip()]
     if len(lines) != count:
         raise ForeignFileError(
-            path, f"has {len(lines)} times", due=f"{count} are expected, one for each file in data"
+            path,
+            f"has {len(lines)} times",
+            expected=f"{count} are expected, one for each file in data",
         )
     t_ns = np.array([_stamp(path, k, line) for k, line in enumerate(lines, 1)], np.int64)
     back = np.nonzero(np.diff(t_ns) <= 0)[0]
@@ -156,9 +158,9 @@ def _stamp(path: Path, line: int, words: str) -> int:
         seconds = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
         return int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
     except ValueError:
-        due = "2011-09-30 12:40:25.069324302 or such is expected"
+        expected = "2011-09-30 12:40:25.069324302 or such is expected"
         raise ForeignFileError(
-            path, f"{words[:40]!r} is no time", at=f"line {line}", due=due
+            path, f"{words[:40]!r} is no time", at=f"line {line}", expected=expected
         ) from None
 
 
@@ -289,7 +291,7 @@ class _KittiCalib:
     def array(self, name: str, *shape: int) -> Floats:
         if name not in self._lines:
             there = ", ".join(self._lines) or "none"
-            raise ForeignFileError(self.path, f"lacks {name}", due=f"there are: {there}")
+            raise ForeignFileError(self.path, f"lacks {name}", expected=f"there are: {there}")
         try:
             numbers = np.array(self._lines[name], np.float64)
         except ValueError:
@@ -298,7 +300,7 @@ class _KittiCalib:
             raise ForeignFileError(
                 self.path,
                 f"{name} has {numbers.size} numbers",
-                due=f"{int(np.prod(shape))} finite ones are expected",
+                expected=f"{int(np.prod(shape))} finite ones are expected",
             )
         return numbers.reshape(shape)
 

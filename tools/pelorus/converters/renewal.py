@@ -95,7 +95,7 @@ def _no_fixed_points(source: Path, why: str) -> ForeignFileError:
         source,
         "its observations are not those of points that stand still, seen from the true poses: "
         f"{why}",
-        due="a simulated recording is expected for --seed",
+        expected="a simulated recording is expected for --seed",
     )
 
 
@@ -108,7 +108,7 @@ def _camera_poses(source: Path, recording: Recording) -> Poses:
         raise ForeignFileError(
             source,
             f"{len(recording.frame_t_ns) - len(mine)} frames have no truth of their time",
-            due="for --seed one each is expected",
+            expected="for --seed one each is expected",
         )
     poses = se3.compose(recording.T_CB, se3.inverse(recording.truth.at(theirs)))
     return poses.at(recording.tracks.frame)

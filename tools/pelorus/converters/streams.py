@@ -251,7 +251,7 @@ def _require_gravity(readings: Readings) -> None:
         raise ForeignFileError(
             readings.where,
             f"the specific force is {usual:.3g} m/s^2 in the median",
-            due="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
+            expected="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
             "gravity "
             "been taken away? Raw readings are expected",
         )
@@ -392,7 +392,7 @@ def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
         raise ForeignFileError(
             rig.path,
             f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
-            due="the calibration of these pictures is needed",
+            expected="the calibration of these pictures is needed",
         )
     return rig.of_size(*min(holding, key=np.prod))
 
@@ -401,7 +401,9 @@ def _require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> N
     words = resolution.beyond(tracks.pixels, size)
     if words:
         raise ForeignFileError(
-            where, words, due="the calibration of these pictures, or pixels of those, are expected"
+            where,
+            words,
+            expected="the calibration of these pictures, or pixels of those, are expected",
         )
 
 
@@ -413,7 +415,8 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
         raise ForeignFileError(
             source,
             "no pixel is one of the calibration's lenses",
-            due="pixels as the cameras took them are expected, of the calibration's resolution",
+            expected="pixels as the cameras took them are expected, of the calibration's "
+            "resolution",
         )
     return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
 

@@ -37,7 +37,7 @@ def in_body(
         raise ForeignFileError(
             twists.where,
             f"has no orientation, and --twist-in {asked.value} turns by it",
-            due="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
+            expected="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
             "px_m, "
             "py_m, pz_m)",
         )
@@ -49,7 +49,7 @@ def in_body(
     if asked is TwistIn.POSES:
         if not has_place:
             raise ForeignFileError(
-                twists.where, "has no places", due="px_m, py_m, pz_m are expected"
+                twists.where, "has no places", expected="px_m, py_m, pz_m are expected"
             )
         return _of_poses(twists, poses, timing)
     v, w = twists.v_B_mps, twists.w_B_radps

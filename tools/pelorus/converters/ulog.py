@@ -35,7 +35,9 @@ def table(path: Path, file: str) -> Table:
     it.
     """
     if file not in ("imu", "gyro"):
-        raise ForeignFileError(path, "is a log of PX4", due="it is read as --imu or --gyro alone")
+        raise ForeignFileError(
+            path, "is a log of PX4", expected="it is read as --imu or --gyro alone"
+        )
     with extra("pyulog"):
         from pyulog import ULog  # noqa: PLC0415 - an extra
     try:

@@ -26,7 +26,7 @@ def of_share(share: float, count: float, usual: float) -> float:
     if not usual < share <= 1:
         return 0.0
     parts = ((share, usual), (1 - share, 1 - usual))
-    return 2 * count * sum(p * float(np.log(p / due)) for p, due in parts if p > 0)
+    return 2 * count * sum(p * float(np.log(p / expected)) for p, expected in parts if p > 0)
 
 
 def with_ratio(words: str, ratio: float | None) -> str:
