@@ -57,8 +57,8 @@ class Bag(AbstractContextManager["Bag"]):
             raise ForeignFileError(
                 path,
                 "is a folder without metadata.yaml",
-                expected="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap or "
-                "a .db3 is expected (ros2 bag reindex makes a metadata.yaml)",
+                expected="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap "
+                "or a .db3 is expected (ros2 bag reindex makes a metadata.yaml)",
             )
         self._open_files = ExitStack()
         self._reader = self._opened()
