@@ -60,9 +60,7 @@ def small(picture: Gray, times: int) -> Gray:
 
 
 def turns(t_ns: Times, readings: Inertial, R_CB: Floats) -> list[Floats]:
-    """Returns the points' predicted rotation in the camera from each pair to the next, by the
-    gyro.
-    """
+    """Returns the points' rotation in the camera from pair to pair, by the gyro."""
     found = []
     for begin, end in pairwise(t_ns.tolist()):
         between = (readings.t_ns >= begin) & (readings.t_ns < end)

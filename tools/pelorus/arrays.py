@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads arrays from .npz and .mat files, with errors that say what is there and what is
-expected.
-"""
+"""Reads arrays from .npz and .mat files, with errors that say what is expected."""
 
 from __future__ import annotations
 

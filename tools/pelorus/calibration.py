@@ -26,9 +26,7 @@ IMAGE_SIZE_MAX = 65535
 
 
 def read(path: Path) -> Header:
-    """Returns the HEADER that the file describes; refuses unknown names, for they may be typing
-    errors.
-    """
+    """Returns the HEADER that the file describes; refuses unknown names, perhaps typing errors."""
     return _Calibration(path, foreign.json_object(path)).header()
 
 

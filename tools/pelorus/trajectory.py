@@ -41,9 +41,7 @@ CELL_SHOWN = 40  # characters of a bad one
 
 
 class Trajectory(NamedTuple):
-    """Body poses at ascending times; `remarks` are on how a file was read, and what was left
-    out.
-    """
+    """Body poses at ascending times; `remarks` are on what was read, and left out."""
 
     t_ns: Times
     poses: Poses
@@ -51,9 +49,7 @@ class Trajectory(NamedTuple):
 
 
 def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
-    """Returns the trajectory with a pose at each wanted time between poses that are close
-    enough.
-    """
+    """Returns the trajectory with a pose at each wanted time between close enough ones."""
     t_ns = whole.t_ns
     lacking = np.setdiff1d(wanted_t_ns, t_ns)
     lacking = lacking[(lacking > t_ns[0]) & (lacking < t_ns[-1])]
@@ -214,9 +210,7 @@ def is_finite(pose: Pose | Truth) -> bool:
 
 
 def estimate_in(messages: Sequence[Message]) -> tuple[Trajectory, Floats] | None:
-    """Returns a filter's finite poses after STEREO, with covariance (n, 6, 6), NaN where
-    unknown.
-    """
+    """Returns a filter's finite poses after STEREO, and covariances (n, 6, 6), NaN if unknown."""
     found = (m for m in messages if isinstance(m, Pose) and m.after_stereo)
     poses = {m.t_ns: m for m in found if is_finite(m)}
     if not poses:

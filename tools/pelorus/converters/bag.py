@@ -99,9 +99,7 @@ class Bag(AbstractContextManager["Bag"]):
         ]
 
     def require(self, topic: str, *kinds: str) -> str:
-        """Returns the topic, if it exists and holds messages of such a type; PelorusError
-        otherwise.
-        """
+        """Returns the topic if it holds messages of such a type; raises PelorusError otherwise."""
         if topic not in self.types:
             raise PelorusError(f"{self.path}: has no topic {topic}; {self.listing()}")
         if self.types[topic] not in kinds or topic not in self.of_type(*kinds):
@@ -125,15 +123,11 @@ class Bag(AbstractContextManager["Bag"]):
         return sum(self._reader.topics[topic].msgcount for topic in topics)
 
     def messages(self, topics: Sequence[str], whole: bool = False) -> Iterator[Stamped]:
-        """Yields messages in the order of arrival; `whole`: of all the bag, not only the chosen
-        part.
-        """
+        """Yields messages in the order of arrival; `whole`: of all the bag, not of the part."""
         return self._messages(self._reader, topics, whole)
 
     def written(self, topics: Sequence[str]) -> Iterator[Stamped]:
-        """Yields messages in the order in which they stand in the file, whatever the recorder's
-        clock.
-        """
+        """Yields messages in the order of the file, whatever the recorder's clock said."""
         return self._messages(self._by_place, topics)
 
     @cached_property

@@ -225,8 +225,8 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
 
 
 def _poses_beside(table: Table) -> Poses | None:
-    """Returns the poses in the twists' file, None where it has no attitude; unknown positions
-    are NaN.
+    """Returns the poses in the twists' file, with NaN positions if unknown; None without
+    attitude.
     """
     if not all(map(table.has, QUATERNION)):
         return None

@@ -93,9 +93,7 @@ def _extrinsic(file: Arrays) -> Poses:
 
 
 def with_truth(recording: Recording, path: Path) -> Recording:
-    """Adds KITTI poses of the left camera; row k belongs to frame k, and there may be fewer
-    rows.
-    """
+    """Adds KITTI poses of the left camera; row k belongs to frame k, rows may be fewer."""
     poses = trajectory.read_kitti(path)
     frames = len(recording.frame_t_ns)
     if len(poses.p) > frames:

@@ -32,16 +32,14 @@ LOCAL_MAX_M = 1e5  # farther off, east and north are no plane's
 
 @dataclass
 class Ground:
-    """The common ground of all files: `crs` is what the user named, the origin is the first
-    place read.
-    """
+    """The ground of all files: `crs` is the user's, the origin is the first place read."""
 
     crs: str = ""
     origin_m: Floats | None = None  # geocentric
 
     def local(self, path: Path, places: Floats, remarks: list[str]) -> Floats:
-        """Returns (n, 3) m east, north, up of longitude, latitude, height or easting, northing,
-        height.
+        """Returns (n, 3) m east, north, up of (longitude, latitude or easting, northing;
+        height).
         """
         crs = self.system()
         from pyproj import Transformer  # noqa: PLC0415 - an extra

@@ -90,9 +90,7 @@ def _raw(folder: Path, asked: Asked) -> Streams:
 
 
 def _raw_rig(date: Path, cameras: _Folder) -> Rig:
-    """Returns the rig of the rectified pictures; the body is the OXTS unit: x forward, y left, z
-    up.
-    """
+    """Returns the rig of the rectified pictures; the body is the OXTS unit: forward, left, up."""
     path = date / "calib_cam_to_cam.txt"
     cam = _KittiCalib(path)
     first, second = cameras.numbers
@@ -125,9 +123,7 @@ def _oxts_twists(where: Path, t_ns: Times, packets: Floats) -> Twists:
 
 
 def _oxts_poses(packets: Floats) -> Poses:
-    """Returns poses east, north, up of the first packet; Mercator at its latitude, as KITTI's
-    devkit.
-    """
+    """Returns poses east, north, up of the first packet, by Mercator as KITTI's devkit."""
     scale = np.cos(np.radians(packets[0, LAT]))
     east = scale * EARTH_M * np.radians(packets[:, LON])
     north = scale * EARTH_M * np.log(np.tan(np.radians(90 + packets[:, LAT]) / 2))
@@ -218,9 +214,7 @@ def _poses(folder: Path, t_ns: Times, P: Floats, calibrated: Calibrated) -> Traj
 
 
 def _made_twists(where: Path, truth: Trajectory, made: Made) -> Twists:
-    """Returns twists that move each pose to the next one, with noise; a reading holds from its
-    time on.
-    """
+    """Returns noisy twists that move each pose to the next; a reading holds from its time on."""
     if min(made.velocity_sigma_mps, made.gyro_sigma_radps) < 0 or made.seed < 0:
         raise PelorusError("--velocity-sigma, --gyro-sigma and --seed: none may be negative")
     rate = motion.rates(truth.t_ns, truth.poses)

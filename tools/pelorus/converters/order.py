@@ -55,9 +55,7 @@ class Stamps(NamedTuple):
 def sound(
     bag: Bag, topic: str, t_ns: Times, numbers: Floats, remarks: list[str]
 ) -> NDArray[np.bool_]:
-    """Returns which messages have a time and finite numbers; refuses a topic with too many bad
-    ones.
-    """
+    """Returns which messages have a time and finite numbers; refuses too many bad ones."""
     timed = ~arrays.never_set(t_ns) if t_ns.any() else np.zeros(len(t_ns), np.bool_)
     finite = np.isfinite(numbers).all(axis=1)
     expected = "times in header.stamp are expected, or --stamps log: those of the messages' arrival"
@@ -70,9 +68,7 @@ def sound(
 def leave_out(
     bag: Bag, topic: str, bad: int, count: int, wrong: str, remarks: list[str], expected: str = ""
 ) -> None:
-    """Remarks that `bad` of `count` messages are left out; refuses the topic if they are too
-    many.
-    """
+    """Remarks that `bad` of `count` messages are left out; refuses too many."""
     if bad > foreign.BAD_ROWS_MAX * count:
         raise ForeignFileError(bag.path, f"{bad} of {count} {wrong}", at=topic, expected=expected)
     if bad:

@@ -49,9 +49,7 @@ AXES = [f"{kind}{axis}" for kind in "vw" for axis in "xyz"]
 
 @dataclass(frozen=True)
 class Wheels:
-    """Joints that turn at rad/s; with a track width the turn is by the last one minus the first
-    one.
-    """
+    """Joints that turn at rad/s; with a track width the last minus the first gives the turn."""
 
     topic: str
     joints: tuple[str, ...]

@@ -345,9 +345,7 @@ def joined(
 
 
 def _held_between(t_ns: Times, timing: TwistTiming) -> Times:
-    """Returns the times between which readings hold: their own, or half way where they are
-    centred.
-    """
+    """Returns the times between which readings hold: their own, or half way if centred."""
     if timing is not TwistTiming.MID:
         return t_ns
     half_way = t_ns[:-1] + np.diff(t_ns) // 2
@@ -359,9 +357,7 @@ def _times_of(motion: Twists | Readings) -> Times:
 
 
 def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
-    """Returns whether the body moves from the previous frame to each; by an IMU, whether it
-    turns.
-    """
+    """Returns whether the body moves from frame to frame; by an IMU, whether it turns."""
     if isinstance(motion, Twists):
         return repeated.moves(t_ns, motion.t_ns, motion.w_B_radps, motion.v_B_mps)
     w = motion.inertial.w_B_radps

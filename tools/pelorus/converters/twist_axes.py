@@ -28,9 +28,7 @@ RESTS = 1e-6  # m and rad: largest change of a pose at rest
 def in_body(
     twists: Twists, poses: Poses | None, asked: TwistIn, timing: TwistTiming, remarks: list[str]
 ) -> Twists:
-    """Returns the twists in body axes, by poses (body to world) of the same times, if there are
-    any.
-    """
+    """Returns the twists in body axes, by poses (body to world) of the same times, if any."""
     if asked is TwistIn.BODY or (asked is TwistIn.AUTO and not (poses and twists.is_whole)):
         return twists
     if poses is None:
@@ -107,9 +105,7 @@ def _fits_the_world(x: Floats, x_B: Floats, before: Poses, seconds: float) -> bo
 
 
 def _of_poses(twists: Twists, poses: Poses, timing: TwistTiming) -> Twists:
-    """Returns the twists that move each pose to the next one, at the times that the timing
-    needs.
-    """
+    """Returns the twists that move each pose to the next, at the times of the timing."""
     t_ns, rate = twists.t_ns, motion.rates(twists.t_ns, poses)
     if timing is TwistTiming.MID:
         t_ns = t_ns[:-1] + np.diff(t_ns) // 2

@@ -11,9 +11,7 @@ import numpy as np
 
 
 def of_estimate(x: float, given: float, other: float, sigma: float) -> float:
-    """Returns the ratio of an estimate whose value is `given` without the fault and `other` with
-    it.
-    """
+    """Returns the ratio of an estimate that is `given` without the fault, `other` with it."""
     return ((x - given) ** 2 - (x - other) ** 2) / (sigma**2 + 1e-12)
 
 

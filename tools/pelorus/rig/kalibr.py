@@ -86,9 +86,7 @@ def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
 
 
 def _chained(cameras: Sequence[Named]) -> list[Poses]:
-    """Returns maps to each camera from a common frame: the first camera, or the IMU if all name
-    it.
-    """
+    """Returns maps to each camera from the first one, or from the IMU if all name it."""
     on_body = [_on_body(camera) for camera in cameras]
     known = [T for T in on_body if T is not None]
     if len(known) == len(cameras):

@@ -91,9 +91,7 @@ def settings_of(given: Any) -> dict[str, OptionField]:
 
 
 def option_name(name: str) -> str:
-    """Returns the option of a field: duration_s is --duration, slip_span --slip-from and
-    --slip-for.
-    """
+    """Returns the option of a field: duration_s is --duration, slip_span --slip-from, -for."""
     for unit in (*UNITS, "_span"):
         name = name.removesuffix(unit)
     return "--" + name.replace("_", "-")

@@ -178,9 +178,7 @@ class Options:
 
     @property
     def lookahead_s(self) -> float:
-        """Returns how far beyond the drive's end landmarks are needed, for the camera looks
-        ahead.
-        """
+        """Returns how far beyond the drive's end landmarks are needed: the camera looks ahead."""
         return min(self.range_m / self.speed_mps, self.lap_s) if self.speed_mps else 0.0
 
 
