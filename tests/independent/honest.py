@@ -87,7 +87,7 @@ class Outcome:
 
 
 def cross_matrix(w: Floats) -> Floats:
-    """(..., 3) -> (..., 3, 3)."""
+    """Returns (..., 3, 3) of (..., 3)."""
     zero = np.zeros_like(w[..., 0])
     rows = (zero, -w[..., 2], w[..., 1], w[..., 2], zero, -w[..., 0], -w[..., 1], w[..., 0], zero)
     return np.stack(rows, axis=-1).reshape(*w.shape, 3)

@@ -120,7 +120,7 @@ def later(drive: Recording, first: int) -> Recording:
 
 
 def tell(name: str, drive: Recording, starts: int, program: Path, length: float) -> None:
-    """A row of the table."""
+    """Prints a row of the table."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for k in range(starts):
