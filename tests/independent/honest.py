@@ -87,7 +87,7 @@ class Outcome:
 
 
 def cross_matrix(w: Floats) -> Floats:
-    """(..., 3) -> (..., 3, 3)."""
+    """Returns (..., 3, 3) of (..., 3)."""
     zero = np.zeros_like(w[..., 0])
     rows = (zero, -w[..., 2], w[..., 1], w[..., 2], zero, -w[..., 0], -w[..., 1], w[..., 0], zero)
     return np.stack(rows, axis=-1).reshape(*w.shape, 3)
@@ -114,9 +114,7 @@ def screw(R: Floats, p: Floats) -> Floats:
 
 
 def twists(rng: np.random.Generator, steps: int) -> Floats:
-    """Returns true velocity and rate in the body, (steps, 6), constant in a step: a winding
-    drive.
-    """
+    """Returns true velocity and rate in the body, (steps, 6), each held for a step."""
     t = np.arange(steps) * STEP_S
     largest = np.array([0.3, 0.05, 0.05, 0.05, 0.05, 0.4])
     hertz, phase = rng.uniform(0.03, 0.3, (3, 6)), rng.uniform(0, 2 * np.pi, (3, 6))

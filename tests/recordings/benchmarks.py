@@ -27,9 +27,7 @@ BY_IMU = ("IMU alone",)
 
 @dataclass(frozen=True)
 class Row:
-    """A line of a table: the figure that is shown, and the options of the course's filter, if
-    any.
-    """
+    """A line of a table: its figure, and the options of the course's filter, if any."""
 
     case: Case
     figure: str

@@ -60,9 +60,7 @@ def small(picture: Gray, times: int) -> Gray:
 
 
 def turns(t_ns: Times, readings: Inertial, R_CB: Floats) -> list[Floats]:
-    """Returns the points' predicted rotation in the camera from each pair to the next, by the
-    gyro.
-    """
+    """Returns the points' rotation in the camera from pair to pair, by the gyro."""
     found = []
     for begin, end in pairwise(t_ns.tolist()):
         between = (readings.t_ns >= begin) & (readings.t_ns < end)
@@ -122,7 +120,7 @@ def later(drive: Recording, first: int) -> Recording:
 
 
 def tell(name: str, drive: Recording, starts: int, program: Path, length: float) -> None:
-    """A row of the table."""
+    """Prints a row of the table."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for k in range(starts):

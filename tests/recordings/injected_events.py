@@ -47,7 +47,7 @@ def _each(
 
 
 def slip(messages: Messages, t: int, chance: Chance) -> Messages:
-    """Wheels slip, or slide, for some seconds."""
+    """Makes wheels slip, or slide, for some seconds."""
     factor = chance.choice([0.0, 0.3, 0.5, 1.6, 2.0]) + 0.05 * chance.random()
     until = t + round(chance.uniform(2, 5) * S)
 
@@ -58,7 +58,7 @@ def slip(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def dead_encoder(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The velocity sticks at zero, or at what it was, to the end."""
+    """Makes the velocity stick at zero, or at its last value, to the end."""
     at_zero = chance.random() < 0.5
     held: list[Twist] = []
 
@@ -72,7 +72,7 @@ def dead_encoder(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def dead_gyro(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
-    """The gyro reads nothing, to the end."""
+    """Makes the gyro read nothing, to the end."""
 
     def change(m: Any) -> Message:
         if m.t_ns < t:
@@ -83,7 +83,7 @@ def dead_gyro(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: 
 
 
 def dead_axis(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
-    """The gyro's axis that turns most sticks at what it read, to the end."""
+    """Makes the gyro's axis that turns most stick at its last value, to the end."""
     readings = [m for m in messages if isinstance(m, Twist | Imu)]
     turns = [np.abs(np.atleast_2d(m.w_B_radps)) for m in readings]
     axis = int(np.argmax(np.concatenate(turns).mean(axis=0)))
@@ -101,7 +101,7 @@ def dead_axis(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: 
 
 
 def frozen(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The camera repeats its picture for some seconds."""
+    """Makes the camera repeat its picture for some seconds."""
     until = t + round(chance.uniform(2, 5) * S)
     held: list[Stereo] = []
 
@@ -115,7 +115,7 @@ def frozen(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def clock_step(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The camera's clock steps forward, or back, and stays so; messages come as they came."""
+    """Makes the camera's clock step forward, or back, for good; the order of messages stays."""
     by = round(chance.choice([-1, 1]) * chance.uniform(0.3, 1.5) * S)
 
     def change(m: Stereo) -> Message:
@@ -125,7 +125,7 @@ def clock_step(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def all_clocks_step(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The clock that stamps everything steps forward by some seconds."""
+    """Makes the clock that stamps everything step forward by some seconds."""
     by = round(chance.uniform(1.5, 20) * S)
 
     def change(m: Any) -> Message:
@@ -135,7 +135,7 @@ def all_clocks_step(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def blur(messages: Messages, t: int, chance: Chance) -> Messages:
-    """Most points lie elsewhere for half a second and more, in both images alike."""
+    """Moves most points for half a second and more, in both images alike."""
     until = t + round(chance.uniform(0.5, 0.9) * S)
 
     def change(m: Stereo) -> Message:
@@ -148,7 +148,7 @@ def blur(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def lost_tracks(messages: Messages, t: int, chance: Chance) -> Messages:
-    """Darkness for some seconds; then, as after it, all points have new ids."""
+    """Makes it dark for some seconds, or not; from then on all ids are new, as after darkness."""
     until = t + round(chance.uniform(0.3, 3) * S)
     dark = chance.random() < 0.5
 
@@ -163,8 +163,10 @@ def lost_tracks(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def jump(messages: Messages, t: int, chance: Chance) -> Messages | None:
-    """A part of the drive is cut out: the robot was carried on, unseen by its odometry. As far as
-    the camera still sees enough of what it saw, else nobody could tell; None where it never does.
+    """Cuts a part of the drive out, as if the robot was carried, unseen by its odometry.
+
+    The camera must still see enough of what it saw, or nobody could notice; None where it never
+    does.
     """
     before = [m for m in messages if isinstance(m, Stereo) and m.t_ns < t][-1]
     frames = [m for m in messages if isinstance(m, Stereo) and m.t_ns >= t]
@@ -189,7 +191,7 @@ def jump(messages: Messages, t: int, chance: Chance) -> Messages | None:
 
 
 def shock(messages: Messages, t: int, chance: Chance) -> Messages:
-    """A hit of two or three tenths of a second: readings far beyond what else comes, and blur."""
+    """Adds a hit of two or three tenths of a second: readings far off, and blur."""
     until = t + round(chance.uniform(0.2, 0.4) * S)
     most = {kind: _largest(messages, kind) for kind in MOTION}
 

@@ -110,7 +110,7 @@ START = "images/euroc-mh01-start"
 
 
 def by_real_imu() -> Iterator[Case]:
-    """EuRoC: real readings with simulated points, with tracks of real pictures, with pictures."""
+    """Yields EuRoC's drives: with simulated points, with tracks of real pictures, with pictures."""
     for name, file, convert, figure in (
         ("euroc V101", "imu/euroc-V101-real-imu.npz", ("imu-npz",), "ATE"),
         ("euroc V102", "imu/euroc-V102-real-imu.npz", ("imu-npz",), "ATE"),
@@ -131,7 +131,9 @@ def by_real_imu() -> Iterator[Case]:
 
 
 def people(folder: Path) -> Iterator[Case]:
-    """The drives of wild2/01, made in `folder` where they are not there; none without the data."""
+    """Yields the drives of wild2/01, made in `folder` if they are missing; none without the
+    data.
+    """
     if not (DATA / PERSON).is_dir():
         return
     made = folder / "wild2" / Path(PERSON).name
@@ -185,7 +187,7 @@ def converted(case: Case, folder: Path) -> Path:
 
 
 def run(program: Path, recording: Path, options: Sequence[str]) -> list[Message]:
-    """The messages of a replay's log."""
+    """Returns the messages of a replay's log."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.plr"
         command = [str(program), str(recording), "--quiet", *options, "--out", str(log)]
@@ -240,7 +242,7 @@ def _honesty(reports: Sequence[Report | None], worst: Floats) -> Figures:
 
 
 def built_without() -> Path:
-    """The programs of a build without the supervisor."""
+    """Returns the programs of a build without the supervisor."""
     folder = ROOT / "build/without-supervisor"
     configure = ["cmake", "-S", str(ROOT), "-B", str(folder), "-DCMAKE_BUILD_TYPE=Release"]
     configure += ["-DPELORUS_BUILD_TESTS=OFF", "-DPLR_SUPERVISE=OFF"]
@@ -254,7 +256,7 @@ def built_without() -> Path:
 
 
 def beside(name: str, figure: str, whole: Figures, alone: Figures) -> str:
-    """A row: the error with and without the supervisor, and what else it changes."""
+    """Returns a row: the error with and without the supervisor, and what else it changes."""
     ratio = whole[figure] / alone[figure]
     told = f"**{ratio:.2f}**" if ratio > WORSE else f"{ratio:.2f}"
     cells = [name, "road" if name == "03" else figure]
@@ -265,7 +267,7 @@ def beside(name: str, figure: str, whole: Figures, alone: Figures) -> str:
 
 
 def comparison(program: Path, without: Path, given: argparse.Namespace) -> Iterator[str]:
-    """The lines of the table, every real recording and the worst of the drives with a person."""
+    """Yields the lines of the table: every real recording, and the worst drive with a person."""
     yield "| recording | figure | with, m | without, m | ratio | NEES/6 | GOOD beyond 3 sigma |"
     yield "|---|---|---|---|---|---|---|"
 
@@ -315,7 +317,7 @@ def compare_supervisor(program: Path, given: argparse.Namespace) -> None:
 
 
 def parser_of(about: str | None, only: str) -> argparse.ArgumentParser:
-    """The options that the harnesses of recordings share."""
+    """Returns the options that the harnesses of recordings share."""
     parser = argparse.ArgumentParser(
         description=about, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -327,12 +329,12 @@ def parser_of(about: str | None, only: str) -> argparse.ArgumentParser:
 
 
 def wanted(some: Iterator[Case], only: str) -> Iterator[Case]:
-    """Those that are named and there."""
+    """Yields the cases that are named, and whose recording exists."""
     return (case for case in some if only in case.name and (DATA / case.file).exists())
 
 
 def judged(programs: Sequence[Path], case: Case, given: argparse.Namespace) -> list[Figures]:
-    """The figures of each program."""
+    """Returns the figures of each program."""
     recording = converted(case, given.cache)
     out = []
     for program in programs:
@@ -347,7 +349,7 @@ def judged(programs: Sequence[Path], case: Case, given: argparse.Namespace) -> l
 
 
 def print_rows(name: str, found: Sequence[Figures]) -> None:
-    """One for each precision."""
+    """Prints a row for each precision."""
     for title, one in zip((name, "  in float64"), found, strict=False):
         row = "".join(f"{one.get(column, np.nan):9.3g}" for column in COLUMNS)
         print(f"{title:28}{row}", flush=True)

@@ -107,7 +107,7 @@ def asked(drive: Path, folder: Path) -> Voices:
 def drives(
     count: int, seed: int, only: str, real: bool, folder: Path
 ) -> Iterator[tuple[str, Path]]:
-    """Name and recording."""
+    """Yields name and recording."""
     for kind, by, own in robots.chosen(count, seed):
         drive = robots.drive(kind, by, own) if only in f"{kind}, by {by}" else None
         if drive is not None:
@@ -121,7 +121,7 @@ def drives(
 
 
 def main() -> int:
-    """A line a drive, and the counts; 1 where the commands disagree."""
+    """Prints a line for each drive, and the counts; returns 1 where the commands disagree."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

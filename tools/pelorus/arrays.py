@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads arrays from .npz and .mat files, with errors that say what is there and what is
-expected.
-"""
+"""Reads arrays from .npz and .mat files, with errors that say what is expected."""
 
 from __future__ import annotations
 
@@ -56,7 +54,7 @@ class Arrays:
                 return key
         there = ", ".join(sorted(self._arrays)) or "none"
         raise ForeignFileError(
-            self.path, f"lacks the array {' or '.join(keys)}", due=f"there are: {there}"
+            self.path, f"lacks the array {' or '.join(keys)}", expected=f"there are: {there}"
         )
 
     def get(self, *keys: str, shape: tuple[int | None, ...] | None = None) -> Floats:
@@ -67,9 +65,9 @@ class Arrays:
         except (TypeError, ValueError):
             raise ForeignFileError(self.path, f"{key} holds no numbers") from None
         if shape is not None and not _fits(array.shape, shape):
-            due = " x ".join("n" if size is None else str(size) for size in shape)
+            expected = " x ".join("n" if size is None else str(size) for size in shape)
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", due=f"{due} is expected"
+                self.path, f"{key} has the shape {array.shape}", expected=f"{expected} is expected"
             )
         if not np.isfinite(array).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -83,7 +81,7 @@ class Arrays:
             raise ForeignFileError(
                 self.path,
                 f"{key} is {array.size} of type {array.dtype}",
-                due="one text is expected",
+                expected="one text is expected",
             )
         item = array.reshape(()).item()
         return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
@@ -92,14 +90,14 @@ class Arrays:
         array = self.get(key)
         if array.size != 1:
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", due="one number is expected"
+                self.path, f"{key} has the shape {array.shape}", expected="one number is expected"
             )
         return float(array.reshape(()))
 
 
-def _fits(shape: tuple[int, ...], due: tuple[int | None, ...]) -> bool:
-    return len(shape) == len(due) and all(
-        d is None or s == d for s, d in zip(shape, due, strict=True)
+def _fits(shape: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(expected) and all(
+        d is None or s == d for s, d in zip(shape, expected, strict=True)
     )
 
 
@@ -129,7 +127,7 @@ def require_baseline(path: Path, length_m: float) -> None:
         raise ForeignFileError(
             path,
             f"the cameras stand {length_m:g} apart",
-            due=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are expected: are these "
+            expected=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are expected: are these "
             "millimetres, or "
             "squares of the board? Divide so that it is in metres",
         )
@@ -166,7 +164,7 @@ def check_seconds(path: Path, what: str, numbers: Floats, unit_ns: float = 1e9) 
         raise ForeignFileError(
             path,
             f"{what} spans {numbers.min():g} to {numbers.max():g}",
-            due=f"{name} from 0 to {most:g} are expected{guess if numbers.min() >= 0 else ''}",
+            expected=f"{name} from 0 to {most:g} are expected{guess if numbers.min() >= 0 else ''}",
         )
 
 

@@ -46,9 +46,7 @@ MEANING = {
 
 @dataclass(frozen=True, eq=False)
 class Calibrated(Message, kind=Kind.CALIBRATION):
-    """The calibration as the filter estimates it; `corrected` and `sigma` (11,) in the order of
-    PARTS.
-    """
+    """The filter's calibration; `corrected` and `sigma` (11,) are in the order of PARTS."""
 
     t_ns: int
     estimated: int  # bits
@@ -67,9 +65,7 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
         return cls(camera=camera, **values)
 
     def parts(self) -> Iterator[tuple[CalibrationPart, float, float]]:
-        """Yields each estimated part with its correction and its remaining sigma, in the part's
-        unit.
-        """
+        """Yields each estimated part with its correction and sigma, in the part's unit."""
         for k, part in enumerate(PARTS):
             if self.estimated >> k & 1:
                 yield part, self.corrected[k] * part.scale, self.sigma[k] * part.scale

@@ -26,9 +26,7 @@ IMAGE_SIZE_MAX = 65535
 
 
 def read(path: Path) -> Header:
-    """Returns the HEADER that the file describes; refuses unknown names, for they may be typing
-    errors.
-    """
+    """Returns the HEADER that the file describes; refuses unknown names, perhaps typing errors."""
     return _Calibration(path, foreign.json_object(path)).header()
 
 
@@ -69,7 +67,7 @@ class _Calibration(Named):
             raise ForeignFileError(
                 self.path,
                 f"has {' and '.join(f'R_{pair}' for pair in given) or 'neither R_CB nor R_BC'}",
-                due="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
+                expected="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
                 "(the camera's pose in the body) are expected",
             )
         pair = given[0]
@@ -107,5 +105,5 @@ class _Calibration(Named):
             raise ForeignFileError(
                 self.path,
                 f"{where} has the unknown name {', '.join(unknown)}",
-                due=f"known are: {', '.join(sorted(known))}",
+                expected=f"known are: {', '.join(sorted(known))}",
             )

@@ -56,9 +56,7 @@ def _leave(number: int, _frame: object) -> None:
 
 
 def _say_what_cannot_be_encoded() -> None:
-    r"""Makes unencodable letters escapes, so that an umlaut in a name is no error: it becomes
-    \xfc.
-    """
+    r"""Escapes unencodable letters: an umlaut in a name is no error, it becomes \xfc."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The settings of a `pelorus.Filter`: a plr_config of the library, by names, and that of a
-recording.
-"""
+"""The settings of a `pelorus.Filter`: a plr_config, by names, and that of a recording."""
 
 from __future__ import annotations
 
@@ -102,9 +100,7 @@ def of_recording(
 
 
 def _asked_for(messages: Iterable[Message], library: native.Library) -> Iterator[dict[int, float]]:
-    """Yields what a recording's CONFIG sets, without invalid values, which a session ignores,
-    too.
-    """
+    """Yields what a recording's CONFIG sets; invalid values are ignored, as by a session."""
     scratch = Configured(library)
     for m in messages:
         if isinstance(m, Config) and not m.build_fingerprint:

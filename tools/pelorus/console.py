@@ -144,9 +144,7 @@ VERDICT_COLOURS = {"good": "green", "care": "yellow", "bad": "red"}
 
 
 def tell_verdict(verdict: Verdict) -> None:
-    """Prints a verdict in its colour, with reasons and settings: the first lines of a command's
-    result.
-    """
+    """Prints a verdict in its colour, with reasons and settings, before a command's result."""
     head, *why = verdict.lines()
     out.print(f"[bold {VERDICT_COLOURS[verdict.mark]}]{escape(head)}[/]")
     for words in why:

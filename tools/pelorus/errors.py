@@ -22,9 +22,7 @@ class PelorusError(Exception):
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turns an error of the system in writing a file into one that names the file and the
-    reason.
-    """
+    """Turns the system's error in writing a file into one that names file and reason."""
     try:
         yield
     except OSError as error:

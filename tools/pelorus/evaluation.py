@@ -94,9 +94,7 @@ class Accuracy:
 
     @property
     def sim3(self) -> Figures:
-        """Returns the ATE with the best scale of the estimate, and that scale, as for one
-        camera's path.
-        """
+        """Returns the ATE with the best scale, and that scale, as for one camera's path."""
         fit, scale = similarity_fit(self.estimate.p, self.truth.p)
         off = self.truth.p - scale * self.estimate.p @ fit.R.T - fit.p
         return {"ate_sim3_m": rms(off), "scale": scale}
@@ -160,9 +158,7 @@ def _onto(T: Poses, T_true: Poses) -> Poses:
 
 
 def about_vertical(T: Poses, T_true: Poses) -> Poses:
-    """Returns A that turns about the vertical alone, maps p_true to p, and R_true as near R as
-    it can.
-    """
+    """Returns A that turns about the vertical alone, and maps T_true to T as well as it can."""
     between = T.R @ T_true.R.T
     x, y = between[0, 0] + between[1, 1], between[1, 0] - between[0, 1]
     cosine, sine = np.array([x, y]) / np.hypot(x, y)
@@ -316,9 +312,7 @@ def _found_by_itself(messages: Sequence[Message]) -> list[Landmark]:
 def on_its_clock(
     messages: Sequence[Message], truth: Trajectory, estimate: Trajectory
 ) -> Trajectory:
-    """Returns the truth on the result's clock: with a camera-offset its poses are between the
-    truth's.
-    """
+    """Returns the truth on the result's clock, which a camera-offset shifts."""
     return filled(truth, estimate.t_ns) if in_force(messages, "camera-offset") else truth
 
 

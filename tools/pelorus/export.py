@@ -40,9 +40,7 @@ def write_map(path: Path, landmarks: Sequence[Landmark]) -> None:
 
 
 def write_tum(path: Path, messages: Sequence[Message]) -> None:
-    """Writes the body's poses after each frame, with times to the nanosecond, for `evaluate` and
-    evo.
-    """
+    """Writes the body's poses after each frame, to the nanosecond, for `evaluate` and evo."""
     found = estimate_in(messages)
     if found is None:
         raise PelorusError("there is no pose after a frame to write")

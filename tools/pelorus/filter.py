@@ -266,9 +266,7 @@ class Filter:
         self._checked("set_pose", self._c.filter_set_pose(self._f, time, c.byref(pose), address(P)))
 
     def set_bias(self, mean: ArrayLike, variance: ArrayLike) -> None:
-        """Sets the prior of the biases, each (6,): of twists (v, w), m/s and rad/s; of an IMU
-        (a, w).
-        """
+        """Sets the biases' prior, each (6,): of twists (v, w), m/s and rad/s; of an IMU (a, w)."""
         b, V = checked("mean", mean, (6,)), checked("variance", variance, (6,))
         self._checked("set_bias", self._c.filter_set_bias(self._f, address(b), address(V)))
 
@@ -293,9 +291,7 @@ class Filter:
             self._checked("predict", status, hint={OTHER_MODE: self._other_process("inertial")})
 
     def inertial(self, t_ns: int, a_B_mps2: ArrayLike, w_B_radps: ArrayLike) -> None:
-        """Takes a reading of an IMU: specific force (3,), m/s^2, at rest upwards; rate (3,),
-        rad/s.
-        """
+        """Takes an IMU's reading: specific force (3,), m/s^2, at rest upwards; rate (3,), rad/s."""
         self._linear[:] = checked("a_B_mps2", a_B_mps2, (3,))
         self._angular[:] = checked("w_B_radps", w_B_radps, (3,))
         status = self._inertial(self._f, whole_number("t_ns", t_ns, MOST_NS), self._twist_at)
@@ -371,9 +367,7 @@ class Filter:
         return Pose(numbers[:9].reshape(3, 3), numbers[9:])
 
     def pose_covariance(self) -> Floats:
-        """Returns (6, 6) of (rho, theta), m and rad in the body's axes; truth is T_WB Exp(rho,
-        theta).
-        """
+        """Returns (6, 6) of (rho, theta), m, rad, body axes; truth is T_WB Exp(rho, theta)."""
         return self._doubles("pose_covariance", (6, 6))
 
     def velocity(self) -> Floats:
@@ -395,9 +389,7 @@ class Filter:
         return b, P
 
     def landmarks(self) -> NDArray[np.void]:
-        """Returns all landmarks in the state, (n,) of LANDMARK: id, p_W_m (3,), P_W_m2 (3, 3)
-        ...
-        """
+        """Returns all landmarks in the state, (n,) of LANDMARK: id, p_W_m (3,), P_W_m2 ..."""
         count = int(self._c.filter_landmark_count(self._f))
         found = np.zeros(count, LANDMARK)
         for slot in range(count):

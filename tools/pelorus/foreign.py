@@ -49,13 +49,13 @@ ArraysByName = dict[str, NDArray[np.generic]]
 class ForeignFileError(PelorusError):
     """A file is not what it should be: which one, where in it, what is wrong, what would be right.
 
-    `due` is a sentence of its own: "12 numbers are expected".
+    `expected` is a sentence of its own: "12 numbers are expected".
     """
 
-    def __init__(self, path: Path, wrong: str, *, at: str = "", due: str = "") -> None:
-        self.path, self.at, self.wrong, self.due = path, at, wrong, due
+    def __init__(self, path: Path, wrong: str, *, at: str = "", expected: str = "") -> None:
+        self.path, self.at, self.wrong, self.expected = path, at, wrong, expected
         place = f"{path}: {at}" if at else str(path)
-        super().__init__(f"{place}: {wrong}; {due}" if due else f"{place}: {wrong}")
+        super().__init__(f"{place}: {wrong}; {expected}" if expected else f"{place}: {wrong}")
 
 
 # --- bytes and text -------------------------------------------------------------------------------
@@ -70,7 +70,7 @@ def content(path: Path, most: int) -> bytes:
                 size += len(piece)
                 if size > most:
                     raise ForeignFileError(
-                        path, "is too long", due=f"at most {most} bytes are expected"
+                        path, "is too long", expected=f"at most {most} bytes are expected"
                     )
                 pieces.append(piece)
     except OSError as error:
@@ -108,7 +108,7 @@ def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
         bad = error.start
     if bad >= 0:  # a zero, too: UTF-16 without a mark, or unwritten data
         raise ForeignFileError(
-            path, "is no text", at=f"byte {bad}", due="text in UTF-8 is expected"
+            path, "is no text", at=f"byte {bad}", expected="text in UTF-8 is expected"
         )
     return found
 
@@ -175,13 +175,13 @@ def sound(
 
     Numbers must be finite in the first `used` columns, or in all.
     """
-    due = columns or Counter(len(row.cells) for row in given).most_common(1)[0][0]
-    short = np.array([len(row.cells) for row in given]) != due
+    expected = columns or Counter(len(row.cells) for row in given).most_common(1)[0][0]
+    short = np.array([len(row.cells) for row in given]) != expected
     first = given[int(short.argmax())]
-    what = f"has {len(first.cells)} numbers; {due} a row are expected"
+    what = f"has {len(first.cells)} numbers; {expected} a row are expected"
     remarks = left_out(path, short, lambda k: f"line {given[k].line}", what)
     whole = _where(given, ~short)
-    found = _numbers(path, whole, due)
+    found = _numbers(path, whole, expected)
     bad = np.asarray(~np.isfinite(found[:, :used]).all(axis=1), np.bool_)
     remarks += left_out(path, bad, lambda k: f"line {whole[k].line}", NOT_FINITE)
     return Sound(_where(whole, ~bad), found[~bad], remarks)
@@ -214,13 +214,13 @@ def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
 
 
 def _numbers(path: Path, given: list[Row], columns: int | None) -> Floats:
-    due = columns or len(given[0].cells)
-    out = np.empty((len(given), due))
+    expected = columns or len(given[0].cells)
+    out = np.empty((len(given), expected))
     for k, (line, cells) in enumerate(given):
         at = f"line {line}"
-        if len(cells) != due:
+        if len(cells) != expected:
             raise ForeignFileError(
-                path, f"has {len(cells)} numbers", at=at, due=f"{due} a row are expected"
+                path, f"has {len(cells)} numbers", at=at, expected=f"{expected} a row are expected"
             )
         if not all(map(is_number, cells)):
             raise ForeignFileError(path, "holds something that is no number", at=at)
@@ -256,7 +256,9 @@ def csv_rows(path: Path) -> Csv:
         table.insert(0, comments[-1])
         skipped -= 1
     if not table:
-        raise ForeignFileError(path, "the file is empty", due="a row of column names is expected")
+        raise ForeignFileError(
+            path, "the file is empty", expected="a row of column names is expected"
+        )
     names, below = table[0], table[1:]
     by_semicolons = len(names) == 1 and ";" in names[0]
     _, more = _comments(below)
@@ -267,7 +269,7 @@ def csv_rows(path: Path) -> Csv:
                 path,
                 f"has {len(row)} cells, the first row names {len(names)}",
                 at=f"row {number}",
-                due="points in numbers, and commas between them, are expected"
+                expected="points in numbers, and commas between them, are expected"
                 if by_semicolons
                 else "",
             )
@@ -289,9 +291,7 @@ def _may_name(comment: list[str], row: list[str]) -> bool:
 
 
 def is_number(cell: str) -> bool:
-    """Returns whether a cell is a number as people write them; Python's 1_763 is a typing error
-    or a name.
-    """
+    """Returns whether a cell is a number as people write them, unlike Python's 1_763."""
     try:
         float(cell)
     except ValueError:
@@ -318,13 +318,13 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
         raise ForeignFileError(
             path,
             "is nested too deep",
-            due="an object with numbers, words and lists of them is expected",
+            expected="an object with numbers, words and lists of them is expected",
         ) from None
     except UnicodeEncodeError:
         raise ForeignFileError(
             path,
             "holds half of a surrogate pair (\\ud800 to \\udfff)",
-            due="whole characters are expected",
+            expected="whole characters are expected",
         ) from None
     except json.JSONDecodeError as error:
         raise ForeignFileError(
@@ -334,7 +334,7 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
         raise ForeignFileError(path, str(error)) from None
     if not isinstance(found, dict):
         raise ForeignFileError(
-            path, "is JSON without names", due="an object with names is expected"
+            path, "is JSON without names", expected="an object with names is expected"
         )
     return found
 
@@ -380,10 +380,7 @@ _Constructor.add_constructor(
 
 
 def yaml_object(path: Path) -> dict[str, Any]:
-    """Reads a YAML object: of Kalibr, of OpenCV, of a data set's sensor.yaml.
-
-    YAML 1.2: 1e-3 is a number.
-    """
+    """Reads an object in YAML 1.2, where 1e-3 is a number: Kalibr's, OpenCV's, a data set's."""
     return yaml_words(path, text(path, YAML_BYTES_MAX))
 
 
@@ -391,7 +388,7 @@ def yaml_words(path: Path, words: str) -> dict[str, Any]:
     """Parses the same from the file's text."""
     if len(words) > YAML_BYTES_MAX:
         raise ForeignFileError(
-            path, "is too long", due=f"at most {YAML_BYTES_MAX} bytes are expected"
+            path, "is too long", expected=f"at most {YAML_BYTES_MAX} bytes are expected"
         )
     _require_shallow(path, words)
     yaml = YAML(typ="safe", pure=True)
@@ -407,7 +404,9 @@ def yaml_words(path: Path, words: str) -> dict[str, Any]:
     except (YAMLError, RecursionError, ValueError) as error:
         raise ForeignFileError(path, f"is no YAML: {_first_line(error)}") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
-        raise ForeignFileError(path, "is YAML without names", due="names with values are expected")
+        raise ForeignFileError(
+            path, "is YAML without names", expected="names with values are expected"
+        )
     return found
 
 
@@ -425,7 +424,7 @@ def _require_shallow(path: Path, words: str) -> None:
         raise ForeignFileError(
             path,
             "is nested too deep",
-            due="names with numbers, words and lists of them are expected",
+            expected="names with numbers, words and lists of them are expected",
         )
 
 
@@ -435,11 +434,11 @@ def _require_shallow(path: Path, words: str) -> None:
 def npz(path: Path) -> ArraysByName:
     """Reads all arrays of a .npz file; refuses pickled objects."""
     _require_file(path)
-    due = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
+    expected = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
     if beginning(path).startswith(NPY_MAGIC):
-        raise ForeignFileError(path, "is a lone array (.npy)", due=due)
+        raise ForeignFileError(path, "is a lone array (.npy)", expected=expected)
     if not zipfile.is_zipfile(path):
-        raise ForeignFileError(path, "is no .npz file, or its end is missing", due=due)
+        raise ForeignFileError(path, "is no .npz file, or its end is missing", expected=expected)
     try:
         _require_unpackable(path)
         with np.load(path, allow_pickle=False) as file:
@@ -456,7 +455,7 @@ def _require_unpackable(path: Path) -> None:
     locked = [member.filename for member in members if member.flag_bits & 1]
     if locked:
         raise ForeignFileError(
-            path, "is encrypted", at=locked[0], due="a zip without a password is expected"
+            path, "is encrypted", at=locked[0], expected="a zip without a password is expected"
         )
     _require_size(path, sum(member.file_size for member in members))
 
@@ -467,7 +466,7 @@ def mat(path: Path) -> ArraysByName:
     packed = content(path, ARRAYS_BYTES_MAX)
     if matfile.is_hdf5(packed):
         raise ForeignFileError(
-            path, "is a MATLAB 7.3 file (HDF5)", due="save it with -v7 to convert it"
+            path, "is a MATLAB 7.3 file (HDF5)", expected="save it with -v7 to convert it"
         )
     try:
         return matfile.arrays(packed, ARRAYS_BYTES_MAX)
@@ -477,7 +476,7 @@ def mat(path: Path) -> ArraysByName:
 
 def _require_file(path: Path) -> None:
     if path.is_dir():
-        raise ForeignFileError(path, "is a folder", due="one file of it is expected")
+        raise ForeignFileError(path, "is a folder", expected="one file of it is expected")
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
     size = path.stat().st_size
@@ -491,7 +490,7 @@ def _require_size(path: Path, size: int) -> None:
         raise ForeignFileError(
             path,
             f"holds {size} bytes of arrays",
-            due=f"at most {ARRAYS_BYTES_MAX} are expected: cut the drive into pieces",
+            expected=f"at most {ARRAYS_BYTES_MAX} are expected: cut the drive into pieces",
         )
 
 

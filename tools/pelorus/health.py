@@ -146,9 +146,7 @@ def _why(answer: Report) -> tuple[str, ...]:
 
 
 def _of_frames(answers: Sequence[Report]) -> Iterator[Spell]:
-    """Yields spells of each health separately, so that a moment of LOST shows in a long
-    DEGRADED.
-    """
+    """Yields spells by health, so that a moment of LOST shows in a long DEGRADED."""
     for health in sorted(set(schema.HEALTHS) - {GOOD}):
         why: Counter[str] = Counter()
         open_: Spell | None = None

@@ -173,9 +173,7 @@ def scatter(readings: Inertial) -> tuple[float, float]:
 
 
 def _density(stretch: Inertial, numbers: Floats) -> float:
-    """Returns a noise density from means of MEAN_S: neighbours differ by density sqrt(2 /
-    MEAN_S).
-    """
+    """Returns a noise density by means of MEAN_S, which differ by density sqrt(2 / MEAN_S)."""
     piece = ((stretch.t_ns - stretch.t_ns[0]) * 1e-9 / MEAN_S).astype(np.int64)
     count = np.bincount(piece)
     whole = count >= 0.5 * np.median(count)

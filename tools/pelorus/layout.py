@@ -190,9 +190,7 @@ def row_type(fields: Sequence[Field]) -> np.dtype[Any]:
 
 
 def _run_of(field: Field) -> tuple[str, int]:
-    """Returns the fields' run: the size of a real is known after the fields before the first
-    one.
-    """
+    """Returns the fields' run: earlier fields give the size of a real."""
     return (field.type if field.type in ("text", "real") else "", field.since)
 
 

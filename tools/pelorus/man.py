@@ -23,9 +23,7 @@ def text(words: str) -> str:
 
 
 def write(command: Any, folder: Path) -> list[Path]:
-    """Writes the pages of the application and all its commands into the folder man1, as man
-    needs it.
-    """
+    """Writes the pages of the application and its commands into the folder man1."""
     context = command.make_context("pelorus", [], resilient_parsing=True)
     pages = dict(_pages(command, context))
     replay = find_programs(None).float32

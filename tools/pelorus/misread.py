@@ -137,9 +137,7 @@ def _readings(R: Floats) -> Iterator[tuple[str, Floats]]:
 
 
 def _steps(R: Floats) -> Floats:
-    """Returns (n, 3) rotation vectors from the first pose to each, which do not depend on the
-    world's axes.
-    """
+    """Returns (n, 3) rotation vectors from the first pose to each, in no world's axes."""
     return np.asarray(Rotation.from_matrix(R[0].T @ R).as_rotvec())
 
 

@@ -66,9 +66,7 @@ def chain(motions: Poses, first: Poses | None = None) -> Poses:
 def dead_reckoning(
     t_ns: Times, v: Floats, w: Floats, timing: TwistTiming, first: Poses | None = None
 ) -> Poses:
-    """Returns the n poses at the times of n readings, v in m/s and w in rad/s, both in body
-    axes.
-    """
+    """Returns the n poses at n readings' times, v in m/s and w in rad/s, both in body axes."""
     return chain(steps(t_ns, v, w, timing), first)
 
 

@@ -24,16 +24,16 @@ class Named:
     def __contains__(self, name: str) -> bool:
         return name in self.content
 
-    def error(self, name: str, value: Any, due: str) -> ForeignFileError:
+    def error(self, name: str, value: Any, expected: str) -> ForeignFileError:
         shown = repr(value)
         shown = shown if len(shown) <= SHOWN_MAX else f"{shown[:SHOWN_MAX]}..."
-        return ForeignFileError(self.path, f"{name} is {shown}", at=self.at, due=due)
+        return ForeignFileError(self.path, f"{name} is {shown}", at=self.at, expected=expected)
 
     def get(self, name: str) -> Any:
         if name not in self.content:
             there = ", ".join(map(str, self.content)) or "none"
             raise ForeignFileError(
-                self.path, f"lacks {name}", at=self.at, due=f"there are: {there}"
+                self.path, f"lacks {name}", at=self.at, expected=f"there are: {there}"
             )
         return self.content[name]
 
@@ -43,8 +43,10 @@ class Named:
         array = as_numbers(value)
         if array is None or array.shape != shape or not sane(array):
             size = " x ".join(map(str, shape))
-            due = f"{size} finite numbers are expected" if shape else "a finite number is expected"
-            raise self.error(name, value, due)
+            expected = (
+                f"{size} finite numbers are expected" if shape else "a finite number is expected"
+            )
+            raise self.error(name, value, expected)
         return array
 
     def number(self, name: str) -> float:

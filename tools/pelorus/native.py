@@ -127,9 +127,7 @@ class Reading(Struct):
 
 
 class ReadingResult(Struct):
-    """The result of a reading: `used`, and `d2`, its squared distance from the prediction, in
-    sigmas.
-    """
+    """The result of a reading: `used`, and `d2`, its squared distance from the prediction."""
 
     c_name = "plr_reading_result"
     status: int
@@ -271,9 +269,7 @@ class Supervision(Struct):
 
 @with_reasons
 class Health(Struct):
-    """How far the estimate may be trusted at some time; seconds since what never happened are
-    infinite.
-    """
+    """How far the estimate may be trusted; seconds since what never happened are infinite."""
 
     c_name = "plr_health_state"
     health: int
@@ -418,9 +414,7 @@ OTHER_SIGNATURES: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
 
 
 class Library:
-    """The library in one precision; its functions are attributes: `filter_update` is
-    plr_filter_update.
-    """
+    """The library in one precision: its attribute `filter_update` is plr_filter_update."""
 
     def __init__(self, path: Path) -> None:
         try:

@@ -168,9 +168,7 @@ class VisionLibrary(Protocol):
 
 @cache
 def library(precision: Precision = "float32") -> VisionLibrary:
-    """Returns the library with these functions; raises PelorusError where it was built without
-    them.
-    """
+    """Returns the library with these functions; raises PelorusError if it has none."""
     found = native.library(precision)
     differ = [s.c_name for s in STRUCTS if found.size_of(s.c_name) != c.sizeof(s)]
     try:

@@ -67,9 +67,7 @@ def _guarded(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _is_output(about: object) -> bool:
-    """Returns whether it is OUT.plr and the like, or --out. Commands check a folder's content
-    themselves.
-    """
+    """Returns whether it is OUT.plr and the like, or --out; not what is in a folder."""
     return isinstance(about, ParameterInfo) and (
         (about.metavar or "").startswith("OUT") or "--out" in (about.param_decls or ())
     )

@@ -84,9 +84,7 @@ class Recording:
         return f"{readings} IMU readings" if readings else f"{len(self.twist_t_ns)} twists"
 
     def dead_reckoning(self) -> Poses:
-        """Returns the body's poses at the frames by the twists alone; the first twist is the
-        origin.
-        """
+        """Returns the body's poses at the frames by twists; the first twist is the origin."""
         timing = self.header.twist_timing
         return motion.path_at(
             self.frame_t_ns, self.twist_t_ns, self.v_B_mps, self.w_B_radps, timing

@@ -67,10 +67,10 @@ def _drift(accuracy: Accuracy, way: Floats, length_m: float) -> Drift | None:
     starts = starts[:: -(-len(starts) // STARTS_MOST) or 1]
     if len(starts) < STARTS_LEAST:
         return None
-    mine, due = (
+    mine, expected = (
         se3.compose(se3.inverse(poses.at(starts)), poses.at(ends[starts]))
         for poses in (accuracy.estimate, accuracy.truth)
     )
-    error = se3.compose(se3.inverse(mine), due)
+    error = se3.compose(se3.inverse(mine), expected)
     angles = se3.log(error)[:, 3:]
     return Drift(length_m, len(starts), rms(error.p), float(np.degrees(rms(angles))))

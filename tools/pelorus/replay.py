@@ -135,9 +135,7 @@ def whole_log_of(source: Path, options: Sequence[str], programs: Path | None) ->
 
 
 def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> float:
-    """Returns the max-depth that would be in force, 0 for none; the program reads its own config
-    files.
-    """
+    """Returns the max-depth in force, 0 for none; the program reads its own config files."""
     stdout, _ = run_program(program, recording, [*options, "--print-config"])
     for line in stdout.splitlines():
         name, _, value = line.partition("=")

@@ -44,7 +44,7 @@ def read_road(path: Path) -> Floats:
         raise ForeignFileError(
             path,
             f"is no road: {len(rows)} rows of {columns} numbers",
-            due="at least two rows arc_m,x_m,y_m are expected",
+            expected="at least two rows arc_m,x_m,y_m are expected",
         )
     return foreign.numbers(path, rows)[:, -2:]
 

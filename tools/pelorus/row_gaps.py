@@ -36,9 +36,7 @@ class RowGaps(NamedTuple):
         return self.smooth_px / float(np.sqrt(2))
 
     def stands_for_px(self, points: float) -> float:
-        """Returns the pixel sigma with which a mean over a frame's points is no better than this
-        error.
-        """
+        """Returns the pixel sigma with which a frame's mean is no better than this error."""
         return self.shared_px * float(np.sqrt(points))
 
 

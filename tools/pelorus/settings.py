@@ -50,8 +50,6 @@ def in_force(messages: Sequence[Message], name: str) -> float | None:
 
 
 def mode_in_force(messages: Sequence[Message]) -> str:
-    """Returns slam, mapping, localization or dead_reckoning; empty if the result does not have
-    it.
-    """
+    """Returns slam, mapping, localization or dead_reckoning; empty if the result has none."""
     mode = in_force(messages, "mode")
     return "" if mode is None else word_of("mode", mode)

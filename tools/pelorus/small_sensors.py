@@ -31,9 +31,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class SmallSensor:
-    """A row of the table. It has one to three numbers, each with a letter by which options name
-    it.
-    """
+    """A row of the table: one to three numbers, each with its letter in options."""
 
     name: str
     columns: Mapping[str, str]  # of its CSV file by letter; the word behind the last _ is the unit

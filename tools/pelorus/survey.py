@@ -248,9 +248,9 @@ def _end_differences(end: End, counts: Counts) -> list[str]:
         Kind.IMU: end.imus,
     }
     return [
-        f"END tells of {due} {kind.name} frames, {counts.frames[kind]} can be read"
-        for kind, due in told.items()
-        if due != counts.frames[kind]
+        f"END tells of {expected} {kind.name} frames, {counts.frames[kind]} can be read"
+        for kind, expected in told.items()
+        if expected != counts.frames[kind]
     ]
 
 

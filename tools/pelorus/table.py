@@ -161,7 +161,7 @@ class Table:
             raise ForeignFileError(
                 self.path,
                 f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}",
-                due=f"there are: {there}{hint}",
+                expected=f"there are: {there}{hint}",
             )
 
     def numbers(self, *names: str) -> Floats:
@@ -186,9 +186,7 @@ class Table:
         return out
 
     def has(self, name: str) -> bool:
-        """Returns whether a column exists, also by its plain name without a unit, which adds a
-        remark.
-        """
+        """Returns whether a column exists; a plain name without a unit adds a remark."""
         if name in self._columns:
             return True
         short, unit = self.plain.get(name, ("", ""))
@@ -239,9 +237,7 @@ class Table:
         return found.t_ns
 
     def _time_column(self) -> str:
-        """Returns the existing one of t_ns, t_us ..., else t_s; a plain t is in s or ns by its
-        numbers.
-        """
+        """Returns the existing one of t_ns, t_us ..., else t_s; plain t is s or ns by its size."""
         known = [*self._columns, *self._missed]
         found = next((name for name in known if name in TIME_COLUMNS), "")
         if found or not self.plain or PLAIN_TIME not in self._columns:

@@ -20,9 +20,7 @@ ABSENT = -1.0  # all four numbers of a landmark that is not in the frame
 
 
 def project(camera: Camera, q_C: Floats) -> Floats:
-    """Projects points in the left camera (n, 3), m, to (n, 4) px: uL vL uR vR. Depth must be
-    positive.
-    """
+    """Projects points in the left camera (n, 3), m, depth > 0, to (n, 4) px: uL vL uR vR."""
     x, y, z = q_C.T
     v = camera.fy_px * y / z + camera.cy_px
     u_left = camera.fx_px * x / z + camera.cx_px
@@ -86,9 +84,7 @@ class Tracks:
 
     @classmethod
     def from_dense(cls, features: Floats) -> Tracks:
-        """Reads (4, M, T): M landmarks in T frames, all four -1 where absent; the id is the
-        column.
-        """
+        """Reads (4, M, T): M landmarks in T frames, -1 where absent; the id is the column."""
         seen = ~(features == ABSENT).all(axis=0)
         frame, id = np.nonzero(seen.T)
         return cls(features.shape[2], frame, id.astype(np.int64), features[:, id, frame].T)
@@ -133,5 +129,5 @@ class Tracks:
             raise ForeignFileError(
                 source,
                 f"a frame has {fullest} observations",
-                due=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
+                expected=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
             )

@@ -41,9 +41,7 @@ CELL_SHOWN = 40  # characters of a bad one
 
 
 class Trajectory(NamedTuple):
-    """Body poses at ascending times; `remarks` are on how a file was read, and what was left
-    out.
-    """
+    """Body poses at ascending times; `remarks` are on what was read, and left out."""
 
     t_ns: Times
     poses: Poses
@@ -51,9 +49,7 @@ class Trajectory(NamedTuple):
 
 
 def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
-    """Returns the trajectory with a pose at each wanted time between poses that are close
-    enough.
-    """
+    """Returns the trajectory with a pose at each wanted time between close enough ones."""
     t_ns = whole.t_ns
     lacking = np.setdiff1d(wanted_t_ns, t_ns)
     lacking = lacking[(lacking > t_ns[0]) & (lacking < t_ns[-1])]
@@ -82,7 +78,7 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
             path,
             f"has {columns} numbers",
             at=f"line {sound.rows[0].line}",
-            due=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
+            expected=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
         )
     if in_ns is None:
         in_ns = arrays.are_ns(sound.numbers[:, 0])
@@ -127,7 +123,7 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
         raise ForeignFileError(
             path,
             f"names the columns {', '.join(names[:POSE_COLUMNS])}",
-            due="time, position and quaternion (x y z w, or w first) are expected, in that "
+            expected="time, position and quaternion (x y z w, or w first) are expected, in that "
             "order or "
             "the quaternion before the position",
         )
@@ -179,7 +175,7 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
         raise ForeignFileError(
             path,
             f"rows of {columns} numbers",
-            due=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
+            expected=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
         )
     return read_stamped(path)
 
@@ -214,9 +210,7 @@ def is_finite(pose: Pose | Truth) -> bool:
 
 
 def estimate_in(messages: Sequence[Message]) -> tuple[Trajectory, Floats] | None:
-    """Returns a filter's finite poses after STEREO, with covariance (n, 6, 6), NaN where
-    unknown.
-    """
+    """Returns a filter's finite poses after STEREO, and covariances (n, 6, 6), NaN if unknown."""
     found = (m for m in messages if isinstance(m, Pose) and m.after_stereo)
     poses = {m.t_ns: m for m in found if is_finite(m)}
     if not poses:
@@ -248,7 +242,7 @@ def read_kitti(path: Path) -> Poses:
             path,
             f"has {len(rows[0].cells)} cells",
             at=f"line {rows[0].line}",
-            due=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
+            expected=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
         )
     numbers = foreign.numbers(path, rows, KITTI_COLUMNS)
     matrices = numbers.reshape(-1, 3, 4)
@@ -257,7 +251,7 @@ def read_kitti(path: Path) -> Poses:
     if off.max() > 1e-2:
         at = f"line {rows[int(off.argmax())].line}"
         raise ForeignFileError(
-            path, "holds no rotation", at=at, due="[R | p] is expected, row by row"
+            path, "holds no rotation", at=at, expected="[R | p] is expected, row by row"
         )
     return Poses(se3.nearest_rotation(R), matrices[:, :, 3])
 
@@ -281,7 +275,7 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
         whose = times
     else:
         raise ForeignFileError(
-            path, "KITTI poses carry no times", due="give --recording or --times"
+            path, "KITTI poses carry no times", expected="give --recording or --times"
         )
     if len(poses.p) > len(t_ns):
         raise ForeignFileError(path, f"{len(poses.p)} poses, but {whose} has {len(t_ns)} times")

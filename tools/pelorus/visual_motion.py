@@ -48,9 +48,7 @@ class SeenPairs:
         return np.bincount(self.frame, minlength=self.frame_count)
 
     def reproject(self, camera: Camera, motion: Poses) -> Floats:
-        """Returns the RMS over the four pixel numbers of each pair, px; infinite behind the
-        camera.
-        """
+        """Returns the RMS over each pair's four pixel numbers; infinite behind the camera."""
         q = np.einsum("nij,nj->ni", motion.R[self.frame], self.q_C) + motion.p[self.frame]
         ahead = q[:, 2] > DEPTH_MIN_M
         error = np.full(len(q), np.inf)
@@ -59,9 +57,7 @@ class SeenPairs:
         return error
 
     def median_by_frame(self, values: Floats, at_least: int = PAIRS_MIN) -> Floats:
-        """Returns (frame_count,) the median of each frame's values, NaN with fewer than
-        `at_least`.
-        """
+        """Returns (frame_count,) each frame's median, NaN with fewer than `at_least`."""
         order = np.lexsort((values, self.frame))
         counts = self.counts()
         middle = np.concatenate(([0], np.cumsum(counts)[:-1])) + counts // 2

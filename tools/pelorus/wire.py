@@ -187,9 +187,7 @@ class Reader:
         return Received(message, sequence, offset)
 
     def _count_missing(self, sequence: int) -> None:
-        """Counts missing frames; a step back, as after a sender's restart, is no gap of almost
-        2^16.
-        """
+        """Counts missing frames; a step back, as after a restart, is no gap of almost 2^16."""
         gap = (sequence - self._expected) % SEQUENCE_MODULUS
         if gap < SEQUENCE_MODULUS // 2:
             self.counts.missing += gap
@@ -234,9 +232,7 @@ class Writer:
         self._counts[message.kind] += 1
 
     def end(self, heard: End | None = None) -> None:
-        """Closes the stream; `heard` is a robot's END, whose numbers of arrived messages go into
-        this one.
-        """
+        """Closes the stream; `heard` is a robot's END, whose numbers go into this one."""
         self.write(end_of(self._counts, heard))
 
 
@@ -336,9 +332,7 @@ def only(frames: Iterable[bytes], kind: Kind) -> Iterator[Message]:
 
 
 def header_of(received: list[Received], path: Path) -> Header:
-    """Returns the first HEADER; raises an error without one, for then no data can be
-    interpreted.
-    """
+    """Returns the first HEADER; raises an error without one."""
     for frame in received:
         if isinstance(frame.message, Header):
             return frame.message

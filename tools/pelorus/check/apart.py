@@ -72,8 +72,8 @@ class HalvesApart:
         return max(self.by_way.values(), default=float("nan"))
 
     @property
-    def due(self) -> float:
-        """Returns the ratio expected of white noise: the largest of four is a sigma above their
+    def expected(self) -> float:
+        """Returns the ratio expected of white noise: the largest of four, a sigma above the
         mean.
         """
         return 1 + self._chance
@@ -89,9 +89,7 @@ class HalvesApart:
 
 
 class Inflated(NamedTuple):
-    """The factor by which noises were enlarged, and how far apart the halves are without and
-    with it.
-    """
+    """The factor of the noises, and how far apart the halves are without and with it."""
 
     times: float
     before: HalvesApart
@@ -137,9 +135,7 @@ class Parts:
         self._parts.append(_Part(k, way, path))
 
     def apart(self, settings: Settings) -> HalvesApart:
-        """Returns how far apart the halves are with these settings; windows with too few data
-        are skipped.
-        """
+        """Returns how far apart halves are with these settings, by windows with enough data."""
         options = options_of({**settings, **SAME_CAMERA})
         with ThreadPoolExecutor(cpu_count() or 1) as pool:
             ran = pool.map(lambda part: self._estimate(part, options), self._parts)
@@ -170,9 +166,7 @@ class Parts:
 
 
 def _typical(values: Sequence[float]) -> float:
-    """Returns the typical value of the windows: the scaled median, so that one passing car
-    counts little.
-    """
+    """Returns the scaled median of the windows, so that one passing car counts little."""
     return float(np.mean(values) if len(values) < 3 else np.median(values) / MEDIAN)
 
 
@@ -235,9 +229,7 @@ def windows(messages: Sequence[Message]) -> Iterator[list[Message]]:
 
 
 def halves(tracks: Tracks) -> tuple[NDArray[np.int64], Masks]:
-    """Returns the ids, and for each way a mask of the first half, with equal numbers of
-    observations.
-    """
+    """Returns the ids, and for each way a mask of the first half of the observations."""
     ids, of_id = np.unique(tracks.id, return_inverse=True)
     count = np.bincount(of_id, minlength=len(ids))
     mean = [

@@ -22,9 +22,7 @@ class CalibrationDoubts:
 
     @property
     def settings(self) -> dict[str, str]:
-        """Returns the settings with which the covariances cover the calibration's errors, if
-        they do not.
-        """
+        """Returns the settings with which the covariances cover the errors, if they do not."""
         return {
             name: value
             for part in (self.scale, self.turn)

@@ -16,14 +16,14 @@ OTHER_SIGMA = 1.2  # ratio of sigmas from which a change is reported
 def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
     """Returns changes of more than a fifth as sentences: `pixel-sigma 2 should be 1`."""
     return [
-        f"{' '.join(filter(None, (name, was)))} should be {due}"
-        for name, was, due in _changed(given, header, tuned, by_imu)
+        f"{' '.join(filter(None, (name, was)))} should be {expected}"
+        for name, was, expected in _changed(given, header, tuned, by_imu)
     ]
 
 
 def lines(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
     """Returns the same changes as lines of a config."""
-    return [f"{name} = {due}" for name, _, due in _changed(given, header, tuned, by_imu)]
+    return [f"{name} = {expected}" for name, _, expected in _changed(given, header, tuned, by_imu)]
 
 
 def _changed(

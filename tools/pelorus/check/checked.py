@@ -80,9 +80,7 @@ class Checked:
 
 
 def check(program: Path, recording: Path, given: Settings, folder: Path) -> Checked:
-    """Tunes in the folder, then replays the whole recording with the given and the found
-    settings.
-    """
+    """Tunes in the folder, then replays the whole recording with old and new settings."""
     step("faults of the recording")
     bench = Bench(program, recording, folder, given.get("process", ""))
     messages = wire.messages_of(recording)
@@ -140,9 +138,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
 def _whole(
     program: Path, recording: Path, settings: Settings, folder: Path, name: str
 ) -> JudgedRun | None:
-    """Returns the replay of the whole recording; None if no frame could be used (a clock is
-    off).
-    """
+    """Returns the replay of the whole recording; None if no frame could be used."""
     outputs = Outputs.named(folder, name)
     try:
         replay(program, recording, options_of(settings), outputs)

@@ -123,8 +123,8 @@ def _costs(
 
 
 def of_parts(outcome: Outcome, matched: int) -> Floats:
-    """Returns costs as if `matched` observations had been used: no offset may win by losing
-    some.
+    """Returns costs as if `matched` observations had been used, so that losing some gains
+    nothing.
     """
     if not np.isfinite(outcome.cost):
         return np.full(PARTS, np.inf)

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads a .plr file as a `Recording`, on which tracks and twists are examined, and cuts parts of
-it.
-"""
+"""Reads a .plr file as a `Recording` for examination, and cuts parts of it."""
 
 from __future__ import annotations
 
@@ -106,9 +104,7 @@ def half(messages: Sequence[Message], which: int) -> list[Message]:
 
 
 def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
-    """Returns the messages with the frames later by the offset, sorted: readings come before
-    frames.
-    """
+    """Returns the messages, sorted, with the frames later by the offset."""
     ahead = [m for m in messages if m.kind in AHEAD or isinstance(m, Start)]
     data: list[tuple[int, int, Message]] = []
     for message in messages:
@@ -145,9 +141,7 @@ def scaled(messages: Sequence[Message], times: float) -> list[Message]:
 
 
 def not_before(messages: Sequence[Message], t_ns: int) -> list[Message]:
-    """Returns all messages shifted so that none is before t_ns: then all offsets move the same
-    frames.
-    """
+    """Returns all messages later, none before t_ns, so that every offset moves the same frames."""
     timed = (Stereo, Twist, Imu, Reading, Start)
     least = min((m.t_ns for m in messages if isinstance(m, timed)), default=t_ns)
     later = max(t_ns - least, 0)

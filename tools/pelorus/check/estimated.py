@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compares the calibration that the filter estimated in a run (setting calibrate) with the
-search's.
-"""
+"""Compares the calibration that the filter estimated in a run with the search's."""
 
 from __future__ import annotations
 
@@ -144,8 +142,6 @@ def turn_in_body(estimate: Calibrated) -> tuple[Floats, Floats]:
 
 
 def without_clock(given: Settings) -> Settings:
-    """Returns the settings for the clock's search, in which the filter must not estimate the
-    clock too.
-    """
+    """Returns the settings for the clock's search, in which the filter estimates no clock."""
     listed = [part for part in given.get("calibrate", "").split(",") if part.strip() != "clock"]
     return {**given, "calibrate": ",".join(listed) or "off"} if "calibrate" in given else given

@@ -58,6 +58,6 @@ def inflate(parts: Parts, of: Callable[[float], Settings]) -> Inflated:
     stays = Inflated(1.0, before, before)
     if not before.ratio > before.by_chance:
         return stays
-    times = float(np.sqrt(before.ratio / before.due))
+    times = float(np.sqrt(before.ratio / before.expected))
     after = parts.apart(of(times))
     return Inflated(times, before, after) if after.ratio <= after.by_chance else stays

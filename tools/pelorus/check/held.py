@@ -45,17 +45,13 @@ def _likelier_in_both_halves(bench: Bench, yours: Settings, found: Settings) -> 
 
 
 def _with_clock_of(given: Settings, found: Tuned) -> dict[str, str]:
-    """Returns the given settings with the found clock, which a parabola over many offsets
-    supports.
-    """
+    """Returns the given settings with the found clock, which many offsets support."""
     clocked = {k: v for k, v in found.settings.items() if k in CLOCK}
     return {k: v for k, v in given.items() if k not in CLOCK} | clocked
 
 
 def _no_narrower(bench: Bench, given: Settings, found: Tuned, side: Settings) -> Tuned:
-    """Returns noises no smaller than the given ones, which cover lasting errors; the rest is
-    `side`.
-    """
+    """Returns noises no smaller than the given ones, beside `side`: they cover lasting errors."""
     noises = no_narrower(bench.header, given, found.settings, of_process(bench.by_imu))
     settings = {**side, **noises}
     why = list(found.lasting)

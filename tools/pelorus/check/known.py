@@ -21,9 +21,7 @@ from pelorus.settings import in_force
 
 @dataclass(frozen=True)
 class Known:
-    """Faults, agreement of camera and body, and noise of the tracks; empty without frames or
-    readings.
-    """
+    """Faults, agreement of camera and body, and track noise; empty without enough data."""
 
     judged: Judged = field(default_factory=lambda: Judged([]))
     noise: TrackNoise | None = None

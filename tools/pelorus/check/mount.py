@@ -48,9 +48,7 @@ class Turned:
 
     @property
     def is_off(self) -> bool:
-        """Returns whether the turn is significant and larger than the filter's position sigma
-        allows.
-        """
+        """Returns whether the turn is significant, and larger than the filter's sigma allows."""
         d2 = self.turn_rad @ np.linalg.solve(self.covariance, self.turn_rad)
         each = float(np.linalg.norm(self.turn_rad) / np.sqrt(3.0))
         matters = self.adds > ADDS or stands(self.given, each, CAMERA_TURN)
@@ -81,9 +79,7 @@ def turned(found: Agreement, messages: Sequence[Message]) -> Turned | None:
 
 
 def _askew(tilt: Floats, poses: Poses) -> Floats:
-    """Returns the error of the pose that a turned camera gives: T_0 Exp(tilt) T_0^-1 T
-    Exp(-tilt).
-    """
+    """Returns the error of a turned camera's pose: T_0 Exp(tilt) T_0^-1 T Exp(-tilt)."""
     at_start = poses.R[0] @ tilt
     off_W = np.cross(at_start, poses.p - poses.p[0])
     way_B, turn_B = np.einsum("nji,nj->ni", poses.R, off_W), at_start @ poses.R - tilt

@@ -52,9 +52,7 @@ CONTRADICTED = number("reason", "TWIST_CONTRADICTED")
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of one replay. `cost` is the mean of -2 ln of a matched observation's
-    likelihood.
-    """
+    """The result of one replay. `cost` is the mean of -2 ln of an observation's likelihood."""
 
     cost: float
     matched: int

@@ -75,9 +75,7 @@ class Doubt:
 
     @property
     def is_untold(self) -> bool:
-        """Returns whether the drive cannot measure the scale: the figure would describe the
-        drive only.
-        """
+        """Returns whether the drive cannot measure the scale, so that no figure is meaningful."""
         return self.sigma > BASELINE_MOST
 
     @property

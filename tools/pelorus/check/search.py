@@ -53,9 +53,7 @@ def search(
     steps: Sequence[float],
     what: str = "noise",
 ) -> BestFound:
-    """Searches from `start` in rounds; `build` makes settings of values, each kept within its
-    limits.
-    """
+    """Searches from `start` in rounds; `build` makes settings of values within their limits."""
     best = BestFound(dict(start), bench.run(build(start)))
     for round_, step in enumerate(steps):
         said = f"{what}, round {round_ + 1} of {len(steps)}"
@@ -90,9 +88,7 @@ def _round(
 
 
 def foot(down: float, middle: float, up: float) -> float:
-    """Returns the vertex of the parabola through (-1, down), (0, middle), (1, up), at most
-    FARTHEST.
-    """
+    """Returns the vertex of the parabola through (-1, down), (0, middle), (1, up), limited."""
     if not all(map(math.isfinite, (down, middle, up))):
         return 0.0
     bend = down - 2 * middle + up

@@ -113,21 +113,19 @@ def _wanders(by_lag: dict[int, float], frame_t_ns: Times) -> float:
 
 
 def _stands_for(by_lag: dict[int, float]) -> float:
-    """Returns the white sigma that stands for the fitted model sigma_lag^2 = w + s^2 (1 -
-    r^lag).
-    """
+    """Returns the white sigma that stands for sigma_lag^2 = w + s^2 (1 - r^lag)."""
     w, s2 = np.clip(_fitted(by_lag, lambda lags: 1 - KEEPS**lags), 0, None)
     stands = np.sqrt(w + s2 * (1 + KEEPS) / (1 - KEEPS))
     return float(min(stands, SIGMA_MOST_PX)) if np.isfinite(stands) else float("nan")
 
 
 def _fitted(by_lag: dict[int, float], growth: Callable[[Floats], Floats]) -> Floats:
-    """Returns (a, b) of sigma_lag^2 = a + b growth(lag), by least squares; NaN where too few
-    lags are known.
+    """Returns (a, b) of sigma_lag^2 = a + b growth(lag), by least squares; NaN with too few
+    lags.
     """
     lags = np.array([lag for lag, sigma in by_lag.items() if np.isfinite(sigma)], np.float64)
     if len(lags) < 2:
         return np.full(2, np.nan)
-    due = np.array([by_lag[int(lag)] ** 2 for lag in lags])
+    expected = np.array([by_lag[int(lag)] ** 2 for lag in lags])
     columns = np.stack((np.ones(len(lags)), growth(lags)), axis=-1)
-    return np.asarray(np.linalg.lstsq(columns, due, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(columns, expected, rcond=None)[0])

@@ -114,9 +114,7 @@ def _of_twists(start: Mapping[str, float], spread: TwistSpread) -> dict[str, flo
 def _of_drifting_tracks(
     bench: Bench, fixed: Settings, start: Mapping[str, float], noise: TrackNoise
 ) -> BestFound:
-    """Keeps the given sigmas unless the data contradict them, and takes pixel-sigma from the
-    tracks.
-    """
+    """Keeps given sigmas unless the data contradict them; takes pixel-sigma from the tracks."""
     values = dict(start)
     if differs_clearly(noise.stands_for_px, start["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")

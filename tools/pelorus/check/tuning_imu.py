@@ -43,9 +43,7 @@ TOLD_FACTOR = 3.0
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
-    """Finds the settings of a recording with an IMU; `given` holds wherever nothing better is
-    found.
-    """
+    """Finds the settings of a recording with an IMU; `given` holds unless others are better."""
     before = bench.run(given)
     noise = track_noise(bench.examined)
     values = start = starting(bench.header, given, IMU | WALKS)
@@ -105,9 +103,7 @@ def _roughly(
 
 
 def _clock(side: Settings, offset: clock.Offset, given: Settings) -> tuple[dict[str, str], str]:
-    """Returns the offset that was found, if it is clearly likelier than the given one, and
-    words.
-    """
+    """Returns the found offset, if it is clearly likelier than the given one, and words."""
     was_s = float(given.get("camera-offset", "0"))
     known = f"known to {2e3 * offset.sigma_s:.2g} ms" if np.isfinite(offset.sigma_s) else "untold"
     # by the parabola: a single cost depends on how many readings a frame averages
@@ -177,17 +173,13 @@ def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[di
 
 
 def _scatter(bench: Bench) -> dict[str, float]:
-    """Returns the filter's own least noises by their names in IMU; values below them change
-    nothing.
-    """
+    """Returns the filter's own least noises by their names in IMU; lower values change nothing."""
     gyro, accel = scatter(bench.examined.inertial)
     return {"gyro": gyro, "accel": accel}
 
 
 def _at_least_scatter(bench: Bench, side: Settings, found: BestFound) -> BestFound:
-    """Raises noises below the filter's own least ones to these: below them the likelihood is
-    constant.
-    """
+    """Raises noises to the filter's own least ones, below which the likelihood is constant."""
     least = _scatter(bench)
     values = {name: max(value, least.get(name, 0.0)) for name, value in found.values.items()}
     if values == found.values:
@@ -251,9 +243,7 @@ def _of_drifting_tracks(
     before: Outcome,
     noise: TrackNoise,
 ) -> Tuned:
-    """Keeps the IMU's given noises, and takes the pixel-sigma that covers the drift of the
-    tracks.
-    """
+    """Keeps the IMU's given noises; takes the pixel-sigma that covers the tracks' drift."""
     values = dict(values)
     if differs_clearly(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")

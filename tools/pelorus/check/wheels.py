@@ -34,9 +34,7 @@ SCATTER_MOST = 2.0  # factor of a reading's sigma
 
 
 class Fitted(NamedTuple):
-    """The fit of a wheel, with sigmas: its scale, its place to the left, m, and its relative
-    scatter.
-    """
+    """The fit of a wheel, with sigmas: its scale, its place to the left, m, and its scatter."""
 
     scale: float
     scale_sigma: float

@@ -170,9 +170,7 @@ def _require_something(
     theirs: tuple[Path, Trajectory],
     messages: list[Message],
 ) -> None:
-    """Refuses a comparison without common poses, or without common landmarks where poses were
-    given.
-    """
+    """Refuses a comparison without common poses, or without landmarks where poses were given."""
     if evaluation.is_mapping(messages):
         if not found["map_landmarks"]:
             raise PelorusError(

@@ -148,9 +148,7 @@ def _draw(
 
 
 def _other(name: str, way: Trajectory, main: Run, truth: Trajectory | None) -> Other:
-    """Returns another program's path moved to the first common pose; PelorusError where there is
-    none.
-    """
+    """Returns another program's path, moved to the first common pose; PelorusError without one."""
     from pelorus.evaluation import assess, beside  # noqa: PLC0415 - scipy loads slowly
     from pelorus.report.curves import Other  # noqa: PLC0415 - as above
 

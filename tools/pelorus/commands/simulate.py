@@ -120,8 +120,8 @@ def _numbers(name: str, text: str) -> Numbers:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        due = "a number, or several parted by commas,"
-        raise PelorusError(f"{option_name(name)} is {text!r}: {due} is expected") from None
+        expected = "a number, or several parted by commas,"
+        raise PelorusError(f"{option_name(name)} is {text!r}: {expected} is expected") from None
 
 
 def _parameter(

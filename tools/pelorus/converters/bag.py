@@ -57,8 +57,8 @@ class Bag(AbstractContextManager["Bag"]):
             raise ForeignFileError(
                 path,
                 "is a folder without metadata.yaml",
-                due="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap or a "
-                ".db3 is expected (ros2 bag reindex makes a metadata.yaml)",
+                expected="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap "
+                "or a .db3 is expected (ros2 bag reindex makes a metadata.yaml)",
             )
         self._open_files = ExitStack()
         self._reader = self._opened()
@@ -99,9 +99,7 @@ class Bag(AbstractContextManager["Bag"]):
         ]
 
     def require(self, topic: str, *kinds: str) -> str:
-        """Returns the topic, if it exists and holds messages of such a type; PelorusError
-        otherwise.
-        """
+        """Returns the topic if it holds messages of such a type; raises PelorusError otherwise."""
         if topic not in self.types:
             raise PelorusError(f"{self.path}: has no topic {topic}; {self.listing()}")
         if self.types[topic] not in kinds or topic not in self.of_type(*kinds):
@@ -125,15 +123,11 @@ class Bag(AbstractContextManager["Bag"]):
         return sum(self._reader.topics[topic].msgcount for topic in topics)
 
     def messages(self, topics: Sequence[str], whole: bool = False) -> Iterator[Stamped]:
-        """Yields messages in the order of arrival; `whole`: of all the bag, not only the chosen
-        part.
-        """
+        """Yields messages in the order of arrival; `whole`: of all the bag, not of the part."""
         return self._messages(self._reader, topics, whole)
 
     def written(self, topics: Sequence[str]) -> Iterator[Stamped]:
-        """Yields messages in the order in which they stand in the file, whatever the recorder's
-        clock.
-        """
+        """Yields messages in the order of the file, whatever the recorder's clock said."""
         return self._messages(self._by_place, topics)
 
     @cached_property
@@ -188,7 +182,7 @@ class Bag(AbstractContextManager["Bag"]):
         return ForeignFileError(
             self.path,
             f"cannot be read as a bag: {words}",
-            due="a whole ROS 1 bag, ROS 2 bag or .mcap is expected (rosbag reindex, ros2 bag "
+            expected="a whole ROS 1 bag, ROS 2 bag or .mcap is expected (rosbag reindex, ros2 bag "
             "reindex or "
             "mcap recover mend one that was cut short)",
         )

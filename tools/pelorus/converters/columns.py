@@ -95,9 +95,7 @@ class Columns:
         return cls(given, ground=Ground(crs), rows=asked)
 
     def read(self, path: Path, file: str) -> Table:
-        """Returns the file's columns under the project's names; `file` is the name of its
-        option.
-        """
+        """Returns the file's columns under the project's names; `file` is its option's name."""
         table = ulog.table(path, file) if ulog.is_one(path) else Table.read(path)
         self.remarks.extend(table.remarks)
         table.hint_of, table.plain, table.remarks = _hint, PLAIN, self.remarks
@@ -164,9 +162,7 @@ def _hint(lacking: str, there: Sequence[str]) -> str:
 
 
 def example(lacking: str, there: Sequence[str]) -> str:
-    """Returns an example of the option: wx=COLUMN:radps, or the column itself if only its unit
-    differs.
-    """
+    """Returns an example of the option: wx=COLUMN:radps, or with the plain column's name."""
     short = _short_of(lacking)
     units = NAMES[short][1]
     for column in there:

@@ -170,7 +170,7 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
             raise ForeignFileError(
                 imu,
                 "has no rates of turn",
-                due=f"{', '.join(RATES.values())} are expected, or --gyro FILE with them; "
+                expected=f"{', '.join(RATES.values())} are expected, or --gyro FILE with them; "
                 "there are: "
                 f"{', '.join(table.names)}",
             )
@@ -211,7 +211,7 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
         raise ForeignFileError(
             path,
             f"lacks the column {', '.join(lacking)}",
-            due=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
+            expected=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
             f"{','.join(there)}. If they are called otherwise: --columns {otherwise}",
         )
     table.require(*lacking)
@@ -225,8 +225,8 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
 
 
 def _poses_beside(table: Table) -> Poses | None:
-    """Returns the poses in the twists' file, None where it has no attitude; unknown positions
-    are NaN.
+    """Returns the poses in the twists' file, with NaN positions if unknown; None without
+    attitude.
     """
     if not all(map(table.has, QUATERNION)):
         return None

@@ -32,9 +32,7 @@ SUBJECT = "heading at the start"
 
 
 def started(recording: Recording) -> tuple[Recording, Finding]:
-    """Returns the recording with a START in the axes of its positions, if its twists determine
-    one.
-    """
+    """Returns the recording with a START in its positions' axes, if its twists determine one."""
     readings = [m for m in recording.readings if m.sensor == POSITION.number and m.axes & 3 == 3]
     level = LEVEL.get(recording.header.body_axes)
     if not len(recording.twist_t_ns):

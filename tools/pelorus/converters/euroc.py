@@ -81,9 +81,7 @@ def _top(folder: Path) -> Path:
 
 
 def _calibrations(top: Path, of_imu: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Returns the folder's calibration files; those that the user gives for an IMU replace its
-    own.
-    """
+    """Returns the folder's calibration files; the user's files of an IMU replace its own."""
     beside = top.parent / TUM_VI
     if not (top / CAMERAS[0] / "sensor.yaml").is_file() and (beside / "camchain.yaml").is_file():
         camchain, imu = map(beside.joinpath, TUM_VI_FILES)
@@ -197,7 +195,7 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
                 listing,
                 f"holds {' '.join(cells)[:60]!r}",
                 at=f"line {line}",
-                due="a time in ns, a file are expected",
+                expected="a time in ns, a file are expected",
             )
         path = data / cells[1]
         found = there.pop(path.stem, None)  # a picture may be another kind of file

@@ -73,8 +73,8 @@ def start_sigmas(words: str) -> StartSigmas:
     except ValueError:
         numbers = []
     if len(numbers) != len(StartSigmas._fields) or not all(0 < x < np.inf for x in numbers):
-        due = f"{len(StartSigmas._fields)} positive numbers parted by commas are expected"
-        raise PelorusError(f"--start-sigmas is {words!r}: {due}")
+        expected = f"{len(StartSigmas._fields)} positive numbers parted by commas are expected"
+        raise PelorusError(f"--start-sigmas is {words!r}: {expected}")
     return StartSigmas(*numbers)
 
 
@@ -167,7 +167,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
             path,
             "stereo_t goes back",
             at=f"row {back[0] + 1}",
-            due="rows in order of time are expected",
+            expected="rows in order of time are expected",
         )
     id = file.get("stereo_id", shape=(count,))
     whole = (id == np.floor(id)) & (id >= 0) & (id < 2.0**32)
@@ -177,7 +177,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
             path,
             f"stereo_id is {id[row]:g}",
             at=f"row {row}",
-            due="a whole number below 2^32 is expected",
+            expected="a whole number below 2^32 is expected",
         )
     t_ns, frame = np.unique(np.round(seconds * 1e9).astype(np.int64), return_inverse=True)
     tracks = Tracks.from_rows(
@@ -223,7 +223,7 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
             path,
             f"the quaternion's norm is {norms[row]:.4f}",
             at=f"{key} row {row}",
-            due="1 is expected, in the order x y z w",
+            expected="1 is expected, in the order x y z w",
         )
     return np.asarray(Rotation.from_quat(quaternions).as_matrix())
 
@@ -241,7 +241,7 @@ def _start_time(path: Path, seconds: float, t_ns: Times) -> int:
             path,
             f"init is of {seconds:.6f} s, the readings of {t_ns[0] * 1e-9:.6f} to "
             f"{t_ns[-1] * 1e-9:.6f} s",
-            due="a state within them is expected",
+            expected="a state within them is expected",
         )
     return nearest if abs(nearest - told) <= SAME_TIME_NS else told
 
@@ -296,8 +296,8 @@ class _Calib(Named):
             process=Process.IMU,
         )
 
-    def _wrong(self, key: str, due: str) -> ForeignFileError:
-        return self.error(key, self.get(key), due)
+    def _wrong(self, key: str, expected: str) -> ForeignFileError:
+        return self.error(key, self.get(key), expected)
 
     def _number_or_0(self, key: str) -> float:
         return self.number(key) if key in self else 0.0

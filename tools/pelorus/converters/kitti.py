@@ -90,9 +90,7 @@ def _raw(folder: Path, asked: Asked) -> Streams:
 
 
 def _raw_rig(date: Path, cameras: _Folder) -> Rig:
-    """Returns the rig of the rectified pictures; the body is the OXTS unit: x forward, y left, z
-    up.
-    """
+    """Returns the rig of the rectified pictures; the body is the OXTS unit: forward, left, up."""
     path = date / "calib_cam_to_cam.txt"
     cam = _KittiCalib(path)
     first, second = cameras.numbers
@@ -125,9 +123,7 @@ def _oxts_twists(where: Path, t_ns: Times, packets: Floats) -> Twists:
 
 
 def _oxts_poses(packets: Floats) -> Poses:
-    """Returns poses east, north, up of the first packet; Mercator at its latitude, as KITTI's
-    devkit.
-    """
+    """Returns poses east, north, up of the first packet, by Mercator as KITTI's devkit."""
     scale = np.cos(np.radians(packets[0, LAT]))
     east = scale * EARTH_M * np.radians(packets[:, LON])
     north = scale * EARTH_M * np.log(np.tan(np.radians(90 + packets[:, LAT]) / 2))
@@ -141,7 +137,9 @@ def _stamps(path: Path, count: int) -> Times:
     lines = [line.strip() for line in foreign.text(path).splitlines() if line.strip()]
     if len(lines) != count:
         raise ForeignFileError(
-            path, f"has {len(lines)} times", due=f"{count} are expected, one for each file in data"
+            path,
+            f"has {len(lines)} times",
+            expected=f"{count} are expected, one for each file in data",
         )
     t_ns = np.array([_stamp(path, k, line) for k, line in enumerate(lines, 1)], np.int64)
     back = np.nonzero(np.diff(t_ns) <= 0)[0]
@@ -156,9 +154,9 @@ def _stamp(path: Path, line: int, words: str) -> int:
         seconds = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
         return int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
     except ValueError:
-        due = "2011-09-30 12:40:25.069324302 or such is expected"
+        expected = "2011-09-30 12:40:25.069324302 or such is expected"
         raise ForeignFileError(
-            path, f"{words[:40]!r} is no time", at=f"line {line}", due=due
+            path, f"{words[:40]!r} is no time", at=f"line {line}", expected=expected
         ) from None
 
 
@@ -216,9 +214,7 @@ def _poses(folder: Path, t_ns: Times, P: Floats, calibrated: Calibrated) -> Traj
 
 
 def _made_twists(where: Path, truth: Trajectory, made: Made) -> Twists:
-    """Returns twists that move each pose to the next one, with noise; a reading holds from its
-    time on.
-    """
+    """Returns noisy twists that move each pose to the next; a reading holds from its time on."""
     if min(made.velocity_sigma_mps, made.gyro_sigma_radps) < 0 or made.seed < 0:
         raise PelorusError("--velocity-sigma, --gyro-sigma and --seed: none may be negative")
     rate = motion.rates(truth.t_ns, truth.poses)
@@ -289,7 +285,7 @@ class _KittiCalib:
     def array(self, name: str, *shape: int) -> Floats:
         if name not in self._lines:
             there = ", ".join(self._lines) or "none"
-            raise ForeignFileError(self.path, f"lacks {name}", due=f"there are: {there}")
+            raise ForeignFileError(self.path, f"lacks {name}", expected=f"there are: {there}")
         try:
             numbers = np.array(self._lines[name], np.float64)
         except ValueError:
@@ -298,7 +294,7 @@ class _KittiCalib:
             raise ForeignFileError(
                 self.path,
                 f"{name} has {numbers.size} numbers",
-                due=f"{int(np.prod(shape))} finite ones are expected",
+                expected=f"{int(np.prod(shape))} finite ones are expected",
             )
         return numbers.reshape(shape)
 

@@ -77,7 +77,7 @@ def _csv(path: Path) -> MapPoints:
         raise ForeignFileError(
             path,
             "says nothing of how certain its landmarks are",
-            due=f"a column {SIGMA}, or {', '.join(COVARIANCE)}, is expected",
+            expected=f"a column {SIGMA}, or {', '.join(COVARIANCE)}, is expected",
         )
     id = table.integers("id", ID_MAX)
     return MapPoints(id, p, P, np.arange(len(p)) + table.first_row)
@@ -90,7 +90,7 @@ def _require_world(path: Path, table: Table) -> None:
                 path,
                 f"the landmark is in the frame {frame!r}",
                 at=f"row {row}",
-                due="landmarks in the world's are expected",
+                expected="landmarks in the world's are expected",
             )
 
 
@@ -103,7 +103,7 @@ def _check(path: Path, points: MapPoints) -> None:
         raise ForeignFileError(
             path,
             f"the id {id} stands {len(rows)} times: rows {rows[0]} and {rows[1]}",
-            due="which one is right cannot be told; one each is expected",
+            expected="which one is right cannot be told; one each is expected",
         )
     P = points.covariance
     variances = np.diagonal(P, axis1=1, axis2=2)

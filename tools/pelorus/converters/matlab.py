@@ -102,7 +102,7 @@ def _features(file: Arrays, count: int) -> Floats:
     raise ForeignFileError(
         file.path,
         f"y_k_j has the shape {y.shape}, but t has {count} times",
-        due=f"4 x {count} x n or 4 x n x {count} is expected",
+        expected=f"4 x {count} x n or 4 x n x {count} is expected",
     )
 
 
@@ -118,6 +118,6 @@ def _noise(file: Arrays) -> Noise:
             raise ForeignFileError(
                 file.path,
                 f"{key} is {variance}",
-                due="variances that are not negative are expected",
+                expected="variances that are not negative are expected",
             )
     return Noise(*(float(np.sqrt(np.mean(variance))) for variance in variances.values()))

@@ -55,26 +55,22 @@ class Stamps(NamedTuple):
 def sound(
     bag: Bag, topic: str, t_ns: Times, numbers: Floats, remarks: list[str]
 ) -> NDArray[np.bool_]:
-    """Returns which messages have a time and finite numbers; refuses a topic with too many bad
-    ones.
-    """
+    """Returns which messages have a time and finite numbers; refuses too many bad ones."""
     timed = ~arrays.never_set(t_ns) if t_ns.any() else np.zeros(len(t_ns), np.bool_)
     finite = np.isfinite(numbers).all(axis=1)
-    due = "times in header.stamp are expected, or --stamps log: those of the messages' arrival"
-    leave_out(bag, topic, int((~timed).sum()), len(t_ns), "headers have no time", remarks, due)
+    expected = "times in header.stamp are expected, or --stamps log: those of the messages' arrival"
+    leave_out(bag, topic, int((~timed).sum()), len(t_ns), "headers have no time", remarks, expected)
     wrong = "messages hold a number that is not finite"
     leave_out(bag, topic, int((~finite).sum()), len(t_ns), wrong, remarks)
     return np.asarray(timed & finite)
 
 
 def leave_out(
-    bag: Bag, topic: str, bad: int, count: int, wrong: str, remarks: list[str], due: str = ""
+    bag: Bag, topic: str, bad: int, count: int, wrong: str, remarks: list[str], expected: str = ""
 ) -> None:
-    """Remarks that `bad` of `count` messages are left out; refuses the topic if they are too
-    many.
-    """
+    """Remarks that `bad` of `count` messages are left out; refuses too many."""
     if bad > foreign.BAD_ROWS_MAX * count:
-        raise ForeignFileError(bag.path, f"{bad} of {count} {wrong}", at=topic, due=due)
+        raise ForeignFileError(bag.path, f"{bad} of {count} {wrong}", at=topic, expected=expected)
     if bad:
         remarks.append(f"{topic}: {bad} of {count} {wrong}: left out")
 
@@ -110,8 +106,8 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
             bag.path,
             f"stamps go back by {found.by_ns / NS:.4g} s at message {found.message}",
             at=topic,
-            due="was a clock set back, or are two recordings in one bag? Each must be converted "
-            f"alone: --until {math.floor(until * 1e3) / 1e3:.3f} takes the first, "
+            expected="was a clock set back, or are two recordings in one bag? Each must be "
+            f"converted alone: --until {math.floor(until * 1e3) / 1e3:.3f} takes the first, "
             f"--from {math.ceil(later * 1e3) / 1e3:.3f} the second; if only the sensor's clock was "
             "set, --stamps log is expected",
         )
@@ -129,7 +125,7 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
                 bag.path,
                 f"{other} of {len(t_ns)} messages have other numbers at the time of the one before",
                 at=topic,
-                due="a stamp for each reading is expected, or --stamps log",
+                expected="a stamp for each reading is expected, or --stamps log",
             )
     if len(times) < len(t_ns):
         remarks.append(f"{topic}: {len(t_ns) - len(times)} messages repeat a time and are left out")

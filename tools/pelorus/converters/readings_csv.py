@@ -51,8 +51,8 @@ def read(table: Table, sensor: SmallSensor) -> list[Reading]:
         if not sensor.at_rest:
             value[:, k] = _within(table, column, VALUE_MAX)
     if not measured:
-        due = f"some of {', '.join(_wanted(sensor))} are expected"
-        raise ForeignFileError(path, "measures nothing", due=due)
+        expected = f"some of {', '.join(_wanted(sensor))} are expected"
+        raise ForeignFileError(path, "measures nothing", expected=expected)
     arm = np.zeros((len(t_ns), 3))
     if sensor.has_arm and any(table.has(name) for name in ARM):
         table.require(*ARM)

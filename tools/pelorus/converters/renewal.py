@@ -34,9 +34,7 @@ MISFIT_MAX = 1.5  # ratio to pixel sigma beyond which the tracks are not of fixe
 
 
 def with_new_ids(tracks: Tracks, chance: np.random.Generator | None = None) -> Tracks:
-    """Gives each unbroken run of frames an id of its own: in the order of beginning, or at
-    random.
-    """
+    """Gives each unbroken run of frames its own id: in the order of beginning, or at random."""
     order = np.lexsort((tracks.frame, tracks.id))
     frame, id = tracks.frame[order], tracks.id[order]
     begins = np.ones(len(order), bool)
@@ -61,9 +59,7 @@ def with_noise(recording: Recording, sigma_px: float, chance: np.random.Generato
 def renew(
     source: Path, recording: Recording, chance: np.random.Generator
 ) -> tuple[Recording, Finding]:
-    """Returns the recording with fresh noise of the HEADER's pixel sigma on the landmarks' true
-    pixels.
-    """
+    """Returns the recording with fresh noise of the HEADER's sigma on the true pixels."""
     tracks, sigma = recording.tracks, recording.header.noise.pixel_sigma_px
     T_CW = _camera_poses(source, recording)
     whose, landmarks = np.unique(tracks.id, return_inverse=True)
@@ -95,7 +91,7 @@ def _no_fixed_points(source: Path, why: str) -> ForeignFileError:
         source,
         "its observations are not those of points that stand still, seen from the true poses: "
         f"{why}",
-        due="a simulated recording is expected for --seed",
+        expected="a simulated recording is expected for --seed",
     )
 
 
@@ -108,7 +104,7 @@ def _camera_poses(source: Path, recording: Recording) -> Poses:
         raise ForeignFileError(
             source,
             f"{len(recording.frame_t_ns) - len(mine)} frames have no truth of their time",
-            due="for --seed one each is expected",
+            expected="for --seed one each is expected",
         )
     poses = se3.compose(recording.T_CB, se3.inverse(recording.truth.at(theirs)))
     return poses.at(recording.tracks.frame)

@@ -90,9 +90,7 @@ def left_out(
 
 
 def _go_on(tracks: Tracks, camera: Camera, repeats: NDArray[np.intp]) -> bool:
-    """Returns whether the points before and after the repeated frames are one rigid scene as
-    elsewhere.
-    """
+    """Returns whether points before and after the repeated frames are one rigid scene."""
     views = two_views(tracks, camera, 2)
     across = np.isin(tracks.frame[views.first], repeats - 1)
     if across.sum() < POINTS_LEAST or across.all():

@@ -174,9 +174,7 @@ def _on_body(
 
 
 def _by_way_of_imu(bag: Bag, body: str, tree: Tree) -> Chain | None:
-    """Returns the chain from the twists' frame to the bag's IMU, if both are known and there is
-    one IMU.
-    """
+    """Returns the chain from the twists' frame to the bag's only IMU, if both are known."""
     frames = {ros_frames.camera_frame(bag, topic) for topic in bag.of_type(IMU)} - {""}
     if len(frames) != 1 or not tree.knows(body, *frames):
         return None

@@ -230,8 +230,8 @@ def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[t
     """Yields the pairs in one pass through the bag; an early picture waits for its partner."""
     wanted = {cameras.left: set(pairs[:, 0].tolist()), cameras.right: set(pairs[:, 1].tolist())}
     waiting: dict[str, dict[int, Gray]] = {cameras.left: {}, cameras.right: {}}
-    due = iter(pairs.tolist())
-    first, second = next(due)
+    expected = iter(pairs.tolist())
+    first, second = next(expected)
     for topic, t_ns, message, _ in bag.messages([cameras.left, cameras.right]):
         if t_ns not in wanted[topic] or t_ns in waiting[topic]:
             continue
@@ -243,7 +243,7 @@ def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[t
             yield pair
             wanted[cameras.left].discard(first)
             wanted[cameras.right].discard(second)
-            following = next(due, None)
+            following = next(expected, None)
             if following is None:
                 return
             first, second = following
@@ -258,7 +258,7 @@ def gray(where: Path, message: Any, bits: int = 16) -> Gray:
     if encoding not in (*PLAIN, *DEEP, *TO_GRAY):
         known = ", ".join((*PLAIN, *DEEP, *TO_GRAY))
         raise ForeignFileError(
-            where, f"pictures are encoded as {encoding}", due=f"{known} are expected"
+            where, f"pictures are encoded as {encoding}", expected=f"{known} are expected"
         )
     if encoding in DEEP:
         return np.asarray(_deep(where, message) >> (bits - 8), np.uint8)
@@ -332,7 +332,7 @@ def observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
         raise ForeignFileError(
             where,
             f"holds no tracks: lacks {', '.join(lacking)}",
-            due=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is expected, or features of "
+            expected=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is expected, or features of "
             f"{', '.join(RAYS)}; there are: {', '.join(columns) or 'none of them'}",
         )
     return np.stack([columns[name] for name in FIELDS], axis=-1)

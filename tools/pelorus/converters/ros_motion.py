@@ -49,9 +49,7 @@ AXES = [f"{kind}{axis}" for kind in "vw" for axis in "xyz"]
 
 @dataclass(frozen=True)
 class Wheels:
-    """Joints that turn at rad/s; with a track width the turn is by the last one minus the first
-    one.
-    """
+    """Joints that turn at rad/s; with a track width the last minus the first gives the turn."""
 
     topic: str
     joints: tuple[str, ...]
@@ -182,7 +180,7 @@ def of_joints(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
                 bag.path,
                 f"{topic} has the joints {', '.join(message.name)} with "
                 f"{len(message.velocity)} velocities",
-                due=f"{', '.join(wheels.joints)} with a velocity each are expected",
+                expected=f"{', '.join(wheels.joints)} with a velocity each are expected",
             )
         return [float(message.velocity[message.name.index(name)]) for name in wheels.joints]
 
@@ -224,8 +222,8 @@ def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
         bag.path,
         f"all its {what} are 0",
         at=topic,
-        due="are they on another topic? --imu-topic of the accelerometer and --gyro-topic of the "
-        f"gyro are expected; {bag.listing()}",
+        expected="are they on another topic? --imu-topic of the accelerometer and --gyro-topic of "
+        f"the gyro are expected; {bag.listing()}",
     )
 
 

@@ -52,7 +52,7 @@ def read(
             bag.path,
             "messages tell no covariance",
             at=topic,
-            due="--position-sigma M is expected",
+            expected="--position-sigma M is expected",
         )
     local = Ground().local(bag.path / topic.lstrip("/"), places, remarks)
     arm_m = _arm(topic, frame, body, tree, remarks)

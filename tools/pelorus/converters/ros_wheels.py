@@ -98,9 +98,9 @@ def _of_topic(bag: Bag, beside: Beside, remarks: list[str]) -> tuple[Rolling, Fl
 
 def _sigma_wanted(bag: Bag, topic: str, beside: Beside) -> float:
     if not beside.sigma_mps:
-        due = "--wheel-sigma M/S is expected: how far a speed is off, slip apart; 0.05 for "
+        expected = "--wheel-sigma M/S is expected: how far a speed is off, slip apart; 0.05 for "
         "many wheels"
-        raise ForeignFileError(bag.path, "messages tell no covariance", at=topic, due=due)
+        raise ForeignFileError(bag.path, "messages tell no covariance", at=topic, expected=expected)
     return beside.sigma_mps
 
 

@@ -251,7 +251,7 @@ def _require_gravity(readings: Readings) -> None:
         raise ForeignFileError(
             readings.where,
             f"the specific force is {usual:.3g} m/s^2 in the median",
-            due="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
+            expected="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
             "gravity "
             "been taken away? Raw readings are expected",
         )
@@ -345,9 +345,7 @@ def joined(
 
 
 def _held_between(t_ns: Times, timing: TwistTiming) -> Times:
-    """Returns the times between which readings hold: their own, or half way where they are
-    centred.
-    """
+    """Returns the times between which readings hold: their own, or half way if centred."""
     if timing is not TwistTiming.MID:
         return t_ns
     half_way = t_ns[:-1] + np.diff(t_ns) // 2
@@ -359,9 +357,7 @@ def _times_of(motion: Twists | Readings) -> Times:
 
 
 def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
-    """Returns whether the body moves from the previous frame to each; by an IMU, whether it
-    turns.
-    """
+    """Returns whether the body moves from frame to frame; by an IMU, whether it turns."""
     if isinstance(motion, Twists):
         return repeated.moves(t_ns, motion.t_ns, motion.w_B_radps, motion.v_B_mps)
     w = motion.inertial.w_B_radps
@@ -392,7 +388,7 @@ def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
         raise ForeignFileError(
             rig.path,
             f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
-            due="the calibration of these pictures is needed",
+            expected="the calibration of these pictures is needed",
         )
     return rig.of_size(*min(holding, key=np.prod))
 
@@ -401,7 +397,9 @@ def _require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> N
     words = resolution.beyond(tracks.pixels, size)
     if words:
         raise ForeignFileError(
-            where, words, due="the calibration of these pictures, or pixels of those, are expected"
+            where,
+            words,
+            expected="the calibration of these pictures, or pixels of those, are expected",
         )
 
 
@@ -413,7 +411,8 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
         raise ForeignFileError(
             source,
             "no pixel is one of the calibration's lenses",
-            due="pixels as the cameras took them are expected, of the calibration's resolution",
+            expected="pixels as the cameras took them are expected, of the calibration's "
+            "resolution",
         )
     return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
 

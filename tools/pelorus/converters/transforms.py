@@ -143,9 +143,7 @@ class Tree:
             )
 
     def optical_of(self, frame: str) -> list[str]:
-        """Returns the frames that only turn this one, as a camera's optical frame does its
-        body's.
-        """
+        """Returns the frames that only turn this one, as a camera's optical frame does."""
         return [
             child
             for child, link in self.links.items()

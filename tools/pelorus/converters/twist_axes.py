@@ -28,16 +28,14 @@ RESTS = 1e-6  # m and rad: largest change of a pose at rest
 def in_body(
     twists: Twists, poses: Poses | None, asked: TwistIn, timing: TwistTiming, remarks: list[str]
 ) -> Twists:
-    """Returns the twists in body axes, by poses (body to world) of the same times, if there are
-    any.
-    """
+    """Returns the twists in body axes, by poses (body to world) of the same times, if any."""
     if asked is TwistIn.BODY or (asked is TwistIn.AUTO and not (poses and twists.is_whole)):
         return twists
     if poses is None:
         raise ForeignFileError(
             twists.where,
             f"has no orientation, and --twist-in {asked.value} turns by it",
-            due="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
+            expected="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
             "px_m, "
             "py_m, pz_m)",
         )
@@ -49,7 +47,7 @@ def in_body(
     if asked is TwistIn.POSES:
         if not has_place:
             raise ForeignFileError(
-                twists.where, "has no places", due="px_m, py_m, pz_m are expected"
+                twists.where, "has no places", expected="px_m, py_m, pz_m are expected"
             )
         return _of_poses(twists, poses, timing)
     v, w = twists.v_B_mps, twists.w_B_radps
@@ -107,9 +105,7 @@ def _fits_the_world(x: Floats, x_B: Floats, before: Poses, seconds: float) -> bo
 
 
 def _of_poses(twists: Twists, poses: Poses, timing: TwistTiming) -> Twists:
-    """Returns the twists that move each pose to the next one, at the times that the timing
-    needs.
-    """
+    """Returns the twists that move each pose to the next, at the times of the timing."""
     t_ns, rate = twists.t_ns, motion.rates(twists.t_ns, poses)
     if timing is TwistTiming.MID:
         t_ns = t_ns[:-1] + np.diff(t_ns) // 2

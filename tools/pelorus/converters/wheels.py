@@ -32,9 +32,7 @@ REST_SIGMA = (0.002, 0.005, 0.0)  # m/s, rad/s
 
 @dataclass(frozen=True)
 class Rolling:
-    """Velocities (n, 3) of a point in the wheels' frame, with sigmas; `letters` are the measured
-    axes.
-    """
+    """Velocities (n, 3) of a point in the wheels' frame, with sigmas; `letters`: measured axes."""
 
     t_ns: Times
     v_W_mps: Floats

@@ -164,9 +164,7 @@ def _jump(log: FilterLog, steps: Steps, k: int) -> Incident:
 def _part(
     log: FilterLog, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, int]
 ) -> Incident:
-    """Returns the finding that pictures and odometry differ from step k on, with its early
-    maximum.
-    """
+    """Returns the finding that pictures and odometry differ from step k on."""
     soon = lasting[k : k + MEDIAN_OF]
     times = soon.max(axis=0)
     along = times[:3] > SIGMAS  # slipping wheels turn wrongly, too
@@ -193,9 +191,7 @@ def _part(
 
 
 def _end(log: FilterLog, steps: Steps, k: int, lasting: Floats, last: int) -> int:
-    """Returns when the difference ends, which may be before the doubt; the doubt's end if not
-    seen.
-    """
+    """Returns when the difference ends, or the doubt's end if it is not seen."""
     off = np.flatnonzero((lasting[k:] > SIGMAS).any(axis=1))
     apart = np.flatnonzero(np.diff(off) > MEDIAN_OF)
     end = k + int(off[apart[0]] if len(apart) else off[-1])
@@ -254,9 +250,7 @@ def _by_pictures(log: FilterLog, low: int, high: int, told: Poses) -> tuple[Pose
 
 
 def _by_filter(log: FilterLog, low: int, high: int) -> Poses:
-    """Returns the motions of the filter's pose from frame to frame; none where a frame was
-    refused.
-    """
+    """Returns the filter's motions from frame to frame; none where a frame was refused."""
     R, p = np.eye(3), np.zeros(3)
     rows = []
     for pose in log.poses[low:high]:

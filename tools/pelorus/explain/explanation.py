@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Collects all findings of a log in episodes: first cause, consequences, and what was seen
-before.
-"""
+"""Collects a log's incidents in episodes: first cause, consequences, what was seen before."""
 
 from __future__ import annotations
 
@@ -40,9 +38,7 @@ TEXTS_TOLD = 3
 
 @dataclass(frozen=True)
 class Episode:
-    """An episode: `first` is the cause, `others` are its consequences, `spells` the health
-    meanwhile.
-    """
+    """An episode: `first` is its cause, `others` its consequences, `spells` the health."""
 
     first: Incident
     others: tuple[Incident, ...]
@@ -114,9 +110,7 @@ class Explanation:
         return out[:LINES]
 
     def _most_telling(self) -> list[tuple[int, Episode]]:
-        """Returns the most important episodes with their numbers, in time order; divergences
-        first.
-        """
+        """Returns the most important episodes with their numbers, divergences first."""
         numbered = list(enumerate(self.episodes, 1))
         worst = sorted(numbered, key=lambda one: one[1].first.cause is not Cause.DIVERGED)
         return sorted(worst[:EPISODES_TOLD], key=lambda one: one[0])
@@ -145,9 +139,7 @@ class Explanation:
         return [f"{number}. {span}: {head}", *(f"   {words}" for words in lines)][: max(room, 2)]
 
     def told_of(self, episode: Episode) -> list[str]:
-        """Returns an episode's lines: first cause, what was seen before, what to do, and
-        consequences.
-        """
+        """Returns an episode's lines: first cause, what was seen before, advice, consequences."""
         first = episode.first
         then = [(f.from_ns, self._follows(f, first)) for f in episode.others]
         then += [(s.from_ns, s.words(self.origin_ns)) for s in episode.spells]
@@ -169,9 +161,7 @@ class Explanation:
         return f", {seconds:.1f} s long" if seconds >= LASTS_S else ""
 
     def json(self) -> dict[str, Any]:
-        """Returns the result as JSON, with times in seconds since the first frame, and in ns as
-        in the log.
-        """
+        """Returns the result as JSON, with times in s since the first frame, and in ns."""
         return {
             "happened": bool(self.episodes),
             "first_cause": None if self.first is None else self._finding(self.first),

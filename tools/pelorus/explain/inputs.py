@@ -163,9 +163,7 @@ TRACKED = 2 * FEW  # points that a frame mostly shares with the one before, wher
 
 
 def losses(log: FilterLog) -> list[tuple[int, int]]:
-    """Returns stretches of frames that share too few points with the ones before, unlike the
-    usual.
-    """
+    """Returns stretches of frames that share unusually few points with the ones before."""
     few = log.shared < FEW
     few[0] = False
     out = []

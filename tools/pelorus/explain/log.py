@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A filter's log by column: stereo frames with the answers of filter and supervisor, and
-readings.
-"""
+"""A filter's log by column: stereo frames with their answers, and readings."""
 
 from __future__ import annotations
 
@@ -62,9 +60,7 @@ class FilterLog:
 
     @cached_property
     def arrived_ns(self) -> Times:
-        """Returns when frames came, by the readings' clock; by their own stamps where there are
-        none.
-        """
+        """Returns when frames came, by the readings' clock; without readings their stamps."""
         return np.where(self.behind_ns == NO_READING, self.t_ns, self.behind_ns)
 
     @property

@@ -86,9 +86,7 @@ def _noise(log: FilterLog, calm: Flags, gate_told: bool) -> Iterator[str]:
 
 
 def _bias(log: FilterLog, calm: Flags) -> str:
-    """Returns a remark on wheels' bias: a wrong scale is along the way, a turned camera across
-    it.
-    """
+    """Returns a remark on wheels' bias: along the way by a scale, across it by a turned camera."""
     poses = [pose for pose, good in zip(log.poses, calm, strict=True) if good and pose is not None]
     v, b = np.zeros(3), np.zeros(6)
     if poses and len(log.readings) and not log.by_imu and log.bias_sigma.all():

@@ -18,9 +18,7 @@ FRAMES_LEAST = 2  # frames: a single one is no event
 
 
 def of_small(log: FilterLog, messages: Sequence[Message]) -> Iterator[Incident]:
-    """Yields stretches of frames with rejected readings, with their sensors and how far off
-    wheels read.
-    """
+    """Yields stretches of frames with rejected readings, with sensors and the wheels' error."""
     readings = [m for m in messages if isinstance(m, Reading)]
     for first, last in runs(log.said(REJECTED)):
         begin, end = int(log.t_ns[max(first - 1, 0)]), int(log.t_ns[last])

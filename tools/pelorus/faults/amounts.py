@@ -172,9 +172,7 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
 
 
 def of_scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
-    """Yields faults of scale by an IMU: turns give the focal length, forces the baseline; the
-    rest is the gyro's scale.
-    """
+    """Yields faults of scale by an IMU: of the focal length, the baseline or the gyro."""
     way = f"the images show {agreed.scale:.3f} +- {agreed.scale_sigma:.3f} times the IMU's way"
     for off, sigma, words in (
         (

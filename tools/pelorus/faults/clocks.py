@@ -30,9 +30,7 @@ WORTH_SIGMAS = 4.0
 
 @dataclass(frozen=True)
 class TwoClocks:
-    """Delay of the frames behind the velocities, and of the velocities behind the rates of turn,
-    s.
-    """
+    """Delay of frames behind velocities, and of velocities behind rates of turn, s."""
 
     ways_s: float = 0.0
     ways_sigma_s: float = float("inf")
@@ -49,9 +47,7 @@ UNTOLD = TwoClocks()
 
 
 def offset_of(recording: Recording, body: Body, seen: CameraMotion, bias: float) -> float:
-    """Returns the frames' offset, s, by least squares from zero and from the greatest
-    correlation.
-    """
+    """Returns the frames' offset, s, fitted from zero and from the greatest correlation."""
     together = _together(recording, body, seen)
     likely = max((float(x) for x in OFFSETS_S), key=lambda x: (together(x), -abs(x)))
     ends = []

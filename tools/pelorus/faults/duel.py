@@ -42,9 +42,7 @@ class Duel:
 
 
 def duel(given: Floats, challenger: Floats, lag: int) -> Duel:
-    """Compares errors of the same frames under both hypotheses; frames that lack one are left
-    out.
-    """
+    """Compares errors of the same frames under both hypotheses; both must have them."""
     both = np.isfinite(given) & np.isfinite(challenger)
     frames = int(both.sum())
     if not frames:

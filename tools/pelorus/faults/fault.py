@@ -27,7 +27,5 @@ class Fault:
 
     @property
     def lasts(self) -> bool:
-        """Returns whether the error lasts longer than a step; gaps, order and a clock do not
-        count.
-        """
+        """Returns whether the error lasts longer than a step; gaps, order, clocks do not count."""
         return self.name not in ("clock", UNTOLD) and not self.name.startswith("time-")

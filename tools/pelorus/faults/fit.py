@@ -233,9 +233,7 @@ def _within(Z: Floats, X: Floats) -> Floats:
 
 
 def _halves(Z: Floats, X: Floats) -> list[tuple[NDArray[np.bool_], Floats, Floats]]:
-    """Returns, for the odd and the even pieces of the drive, which rows are in it, and its Z and
-    X.
-    """
+    """Returns which rows are in the odd and in the even pieces of the drive, with their Z and X."""
     piece = np.arange(len(X)) // PIECE_FRAMES % 2
     return [(piece == own, Z[piece == own], X[piece == own]) for own in (0, 1)]
 

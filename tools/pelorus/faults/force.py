@@ -55,9 +55,7 @@ class Force:
 
 
 def by_gyro(readings: Inertial, bias: Floats) -> Floats:
-    """Returns (n, 3, 3) attitudes at the readings by the gyro; the first one's axes are the
-    world's.
-    """
+    """Returns (n, 3, 3) attitudes by the gyro; the first one's axes are the world's."""
     w = readings.w_B_radps - bias
     tau = np.diff(readings.t_ns)[:, None] * 1e-9
     steps = se3.exp(np.zeros((len(tau), 3)), 0.5 * (w[1:] + w[:-1]) * tau).R
@@ -172,9 +170,7 @@ def _stretches(frame_s: Floats, t: Floats, breaks_s: Floats) -> tuple[NDArray[np
 
 
 def _attitudes(R: Floats, t: Floats, frame_s: Floats) -> tuple[Floats, Floats]:
-    """Returns turns from frame to frame (rad, in body axes), and the attitudes at all but the
-    last.
-    """
+    """Returns turns between frames (rad, in body axes), and the attitudes at all but the last."""
     k = np.clip(np.searchsorted(t, frame_s, side="right") - 1, 0, len(t) - 2)
     step = se3.log(Poses(np.swapaxes(R[k], 1, 2) @ R[k + 1], np.zeros((len(k), 3))))[:, 3:]
     share = np.clip((frame_s - t[k]) / (t[k + 1] - t[k]), 0, 1)
@@ -185,9 +181,7 @@ def _attitudes(R: Floats, t: Floats, frame_s: Floats) -> tuple[Floats, Floats]:
 
 
 def _to_body(at: Floats, turns: Floats) -> Floats:
-    """Returns (k, 3, 3) that map a displacement in the world to the constant body velocity of
-    it.
-    """
+    """Returns (k, 3, 3) maps of a displacement in the world to its constant body velocity."""
     R = se3.exp(np.zeros_like(turns), turns).R
     columns = [se3.log(Poses(R, np.tile(e, (len(R), 1))))[:, :3] for e in np.eye(3)]
     return np.asarray(np.stack(columns, axis=2) @ np.swapaxes(at, 1, 2))
@@ -201,9 +195,7 @@ def _summed(t: Floats, rate: Floats) -> Floats:
 
 
 def _twice(t: Floats, rate: Floats, frame_s: Floats, begin_s: Floats) -> Floats:
-    """Returns (k, 3, m) each interval's displacement by an acceleration since its stretch's
-    start.
-    """
+    """Returns (k, 3, m) each interval's displacement by an acceleration since its begin."""
     once = _summed(t, rate)
     place = _interpolated(t, _summed(t, once), frame_s)
     tau = np.diff(frame_s)[:, None, None]

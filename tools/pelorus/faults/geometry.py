@@ -293,9 +293,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
 
 
 def _otherwise(agreed: Agreement, off: float) -> bool:
-    """Returns whether other unknowns explain the turn: at walking speed a wrong lever looks like
-    one.
-    """
+    """Returns whether other unknowns explain the turn: a wrong lever looks like one."""
     if agreed.tilt_rad is None or agreed.tilt_covariance is None:
         return False
     left = float(np.degrees(np.linalg.norm(agreed.tilt_rad)))
@@ -360,9 +358,7 @@ def _turned(given: Floats, found: Floats, off: float) -> Fault:
 
 
 def _pitch(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """Yields a fault of a few degrees of pitch, which velocities alone cannot separate from a
-    bias.
-    """
+    """Yields a fault of a few degrees of pitch, which for velocities alone may be a bias."""
     if agreed.tilt_rad is None or agreed.tilt_covariance is None:
         return
     across = recording.T_CB.R[0]  # the camera's x in the body
@@ -378,8 +374,8 @@ def _pitched(degrees: str) -> Fault:
 
 
 def _sigma_deg(found: HandEye, given: Floats) -> float:
-    """Returns the standard error of the turn between the two rotations; driving straight leaves
-    roll unknown.
+    """Returns the standard error of the turn between both rotations; straight ways leave roll
+    open.
     """
     axis = _axis_of(found.R @ given.T)
     return float(np.degrees(np.sqrt(axis @ found.R_covariance @ axis)))

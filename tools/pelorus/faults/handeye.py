@@ -162,9 +162,7 @@ def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> tuple[Float
 
 
 def _scale(c: Floats, b: Floats) -> tuple[float, float, float]:
-    """Returns s of c = s b, robustly, with instruments against b's noise: b of neighbouring
-    frames.
-    """
+    """Returns s of c = s b, robustly, with b of neighbouring frames as instruments."""
     instrument = 0.5 * (np.roll(b, 1, axis=0) + np.roll(b, -1, axis=0))
     instrument[[0, -1]] = 0
     offset_c, offset_b = np.zeros(3), np.zeros(3)

@@ -86,9 +86,7 @@ class Matrix:
 
     @property
     def is_told(self) -> bool:
-        """Returns whether M differs from zero: readings of another drive are unrelated to the
-        images.
-        """
+        """Returns whether M differs from zero; another drive's readings are unrelated."""
         m = self.M.ravel()
         return float(m @ np.linalg.solve(self.covariance, m)) > LIMIT
 
@@ -180,9 +178,7 @@ def _halves(readings: Inertial) -> list[NDArray[np.intp]]:
 
 
 def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
-    """Returns the images' turns mapped to the gyro's axes: a common error would look like a
-    lever.
-    """
+    """Returns the images' turns in the gyro's axes: a common error would look like a lever."""
     return np.asarray(w @ fit.x[:9].reshape(3, 3).T + fit.x[9:])
 
 
@@ -301,9 +297,7 @@ def explained(found: Measured, R_CB: Floats) -> Explained | None:
 
 
 def _units(found: Measured) -> Iterator[Explained]:
-    """Yields other units. The median force tells them: in another unit gravity is another
-    number.
-    """
+    """Yields other units by the median force: in another unit gravity is another number."""
     none = np.eye(3)
     for (turn, of_turn), (force_, of_force) in product(TURN_UNITS.items(), FORCE_UNITS.items()):
         words = "; ".join(w for w in (of_turn, of_force) if w)

@@ -11,9 +11,7 @@ import numpy as np
 
 
 def of_estimate(x: float, given: float, other: float, sigma: float) -> float:
-    """Returns the ratio of an estimate whose value is `given` without the fault and `other` with
-    it.
-    """
+    """Returns the ratio of an estimate that is `given` without the fault, `other` with it."""
     return ((x - given) ** 2 - (x - other) ** 2) / (sigma**2 + 1e-12)
 
 
@@ -26,7 +24,7 @@ def of_share(share: float, count: float, usual: float) -> float:
     if not usual < share <= 1:
         return 0.0
     parts = ((share, usual), (1 - share, 1 - usual))
-    return 2 * count * sum(p * float(np.log(p / due)) for p, due in parts if p > 0)
+    return 2 * count * sum(p * float(np.log(p / expected)) for p, expected in parts if p > 0)
 
 
 def with_ratio(words: str, ratio: float | None) -> str:

@@ -63,9 +63,7 @@ def held_to_fit(
 
 
 def _known(found: Judged) -> Iterator[Finding]:
-    """Yields how well the drive shows what was examined, so that silence is not taken for a
-    promise.
-    """
+    """Yields how well the drive shows what was examined: silence is no promise."""
     if found.agreed is not None:
         is_enough = found.agreed.scale_sigma < SCALE_TOLD
         yield Finding(AGREES, False, known_words(found.agreed), CANNOT, is_conclusive=is_enough)

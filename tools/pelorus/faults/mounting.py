@@ -157,9 +157,7 @@ def _beside(by_twists: Floats, turns: Floats | None) -> Floats:
 
 
 def _cost(error: Floats, nuisance: Floats, spread: Floats | None = None) -> tuple[float, Floats]:
-    """Returns the robust cost of what no bias and no lever explains, and the spread of each
-    axis.
-    """
+    """Returns the robust cost beside bias and lever, and the spread of each axis."""
     given = spread
     weight = np.ones(len(error))
     scale: Floats = np.var(error, axis=0) + 1e-12

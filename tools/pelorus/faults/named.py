@@ -45,9 +45,7 @@ USUAL_MOST_NS, USUAL_LEAST_NS = 20e9, {TWISTS: 5e4, READINGS: 2e4, FRAMES: 5e5}
 
 
 def judged_of(messages: Sequence[Message], recording: Recording) -> Judged:
-    """Examines a file: the times of its messages as they are, and the recording that a filter
-    would use.
-    """
+    """Examines a file's times as they are, and the recording that a filter would use."""
     frames = np.array([m.t_ns for m in messages if isinstance(m, Stereo)], np.int64)
     if len(recording.inertial.t_ns):
         imu = [m for m in messages if isinstance(m, Imu)]
@@ -71,9 +69,7 @@ def judged(recording: Recording) -> Judged:
 
 
 def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
-    """Returns the faults: first what spoils the result, then by likelihood; none if none is
-    known.
-    """
+    """Returns the faults, if any: first what spoils the result, then by likelihood."""
     times = [fault for name, t_ns in times_ns.items() for fault in _times(name, t_ns)]
     times += _spans(*times_ns.items())
     short = first_part(recording)

@@ -29,9 +29,7 @@ MIDDLE_LEAST = (1 / 2 + 3 / 4) / 2
 
 
 def beyond(pixels: Floats, size: tuple[int, int]) -> str:
-    """Returns what is wrong with pixels (n, 4) for a picture of that width and height; empty if
-    nothing.
-    """
+    """Returns what is wrong with pixels (n, 4) in a picture of that size; empty if nothing."""
     if not size[0] or not len(pixels):
         return ""
     outside = (pixels.reshape(-1, 2, 2) > np.array(size) + BEYOND_PX).any(axis=(1, 2))

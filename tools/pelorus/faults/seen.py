@@ -28,9 +28,7 @@ BESIDE = (2, 3)  # frames: adjacent pairs share a picture
 
 @dataclass(frozen=True)
 class CameraMotion:
-    """The camera's own v and w in body axes as given, (k, 6), their variances, and which are
-    usable.
-    """
+    """The camera's v and w in body axes, (k, 6), their variances, and which are usable."""
 
     rates: Floats
     variance: Floats
@@ -97,9 +95,7 @@ class CameraMotion:
         return slope(usable, BESIDE[0], float(np.median(self.tau_s)))
 
     def itself(self) -> Motions:
-        """Returns this half's motion as an instrument of the other: same time, independent
-        noise.
-        """
+        """Returns this half's motion as an instrument of the other: independent noise."""
         usable = np.where(self.usable[:, None], self.rates, np.nan)
         return Motions(usable, slope(usable, 1, float(np.median(self.tau_s))), self.by_focal)
 
@@ -109,9 +105,7 @@ class CameraMotion:
         return Motions(self.beside(), self.slope(), focal)
 
     def pairs(self) -> list[tuple[CameraMotion, list[Motions]]]:
-        """Returns pairs of a motion to explain, and instruments: the same motion with other
-        noise.
-        """
+        """Returns motions to explain, with instruments: the same motion with other noise."""
         beside = self.of_others()
         if self.halves is None:
             return [(self, [beside])]
@@ -139,9 +133,7 @@ class CameraMotion:
 
 
 class Motions(NamedTuple):
-    """Instruments of a motion: rates and slopes (k, 6), and their derivatives by the focal
-    length.
-    """
+    """Instruments of a motion: rates and slopes (k, 6), and how a focal length changes them."""
 
     rates: Floats
     slope: Floats
@@ -196,8 +188,6 @@ def pauses(t: Times | Floats, begin: Times | Floats, end: Times | Floats) -> NDA
 
 
 def standard_error(noise: Floats) -> float:
-    """Returns the standard error of a sum over a drive, by blocks, within which noise is
-    correlated.
-    """
+    """Returns the standard error of a sum over a drive, by blocks of correlated noise."""
     blocks = np.arange(len(noise)) * BLOCKS // max(len(noise), 1)
     return float(np.linalg.norm(np.bincount(blocks, noise, BLOCKS))) + 1e-12

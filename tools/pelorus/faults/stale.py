@@ -76,9 +76,7 @@ def _predicted_px(recording: Recording) -> NDArray[np.float64]:
 
 
 def _split(tracks: Tracks, stale: NDArray[np.intp]) -> Tracks:
-    """Gives each stale row a new id, which later rows of that track keep up to the next stale
-    one.
-    """
+    """Gives each stale row a new id, which later rows of that track keep."""
     order = np.lexsort((tracks.frame, tracks.id))
     begins = np.zeros(len(tracks), bool)
     begins[stale] = True

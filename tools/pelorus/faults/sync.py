@@ -29,9 +29,7 @@ MAD_TO_SIGMA, WITHIN_SIGMAS, ROUNDS = 1.4826, 4.0, 5
 
 @dataclass(frozen=True)
 class PictureDelay:
-    """Delay of the right picture behind the left one, s, and the motion of points meanwhile, px,
-    RMS.
-    """
+    """Delay of the right picture, s, and the motion of points meanwhile, px, RMS."""
 
     by_s: float
     sigma_s: float
@@ -123,9 +121,7 @@ def _beside(tracks: Tracks, frame_t_ns: Times, lag: int) -> Rates:
 
 
 def _of_place(pixels: Floats, camera: Camera) -> Floats:
-    """Returns 1, x, y, x^2, x y, y^2 of the left pixel, and the disparity: the calibration's
-    errors.
-    """
+    """Returns 1, x, y, x^2, x y, y^2 of the left pixel, and the disparity."""
     x = (pixels[:, 0] - camera.cx_px) / camera.fx_px
     y = (pixels[:, 1] - camera.cy_px) / camera.fx_px
     disparity = (pixels[:, 0] - pixels[:, 2]) / camera.fx_px

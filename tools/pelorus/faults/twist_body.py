@@ -60,9 +60,7 @@ class TwistBody:
         self._held = header.twist_timing.name
 
     def at(self, t_s: Floats) -> Poses:
-        """Returns poses at seconds since the first twist; between two nodes the rate is
-        constant.
-        """
+        """Returns poses at seconds since the first twist; the rate is constant between nodes."""
         nodes = (self._t_ns - self._t_ns[0]) * 1e-9
         k = np.clip(np.searchsorted(nodes, t_s, side="right") - 1, 0, len(nodes) - 2)
         share = (t_s - nodes[k]) / (nodes[k + 1] - nodes[k])

@@ -23,9 +23,7 @@ MOVES_SHARE = 0.1  # share of the usual speed by the pictures
 
 
 def world_axes(recording: Recording, seen: CameraMotion) -> float:
-    """Returns 2 ln of the likelihood ratio of world axes against the given ones; 0 with too few
-    data.
-    """
+    """Returns 2 ln of the likelihood ratio of world axes to body axes; 0 with too few data."""
     t_s = (recording.frame_t_ns - recording.twist_t_ns[0]) * 1e-9
     R = TwistBody(recording).at(0.5 * (t_s[1:] + t_s[:-1])).R
     told = mean_twists(recording)[:, :3]

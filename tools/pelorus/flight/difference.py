@@ -108,9 +108,7 @@ def _bits(value: object) -> bytes:
 
 
 def _angle_deg(R: Floats) -> float:
-    """Returns the angle by the skew part: the trace would turn float32's rounding into 0.01
-    degrees.
-    """
+    """Returns the angle by the skew part: the trace would amplify float32's rounding."""
     s = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return float(np.degrees(np.arctan2(s, np.trace(R) - 1)))
 

@@ -195,9 +195,7 @@ def _unlike(robot: Config, here: Config) -> str:
 
 
 def _concluded(found: Judgement) -> Judgement:
-    """Returns the verdict on what was compared: after a loss, other bits are no fault of the
-    robot.
-    """
+    """Returns the verdict; after a loss, other bits are no fault of the robot."""
     first, loss = found.first, found.loss
     if first is not None and loss is not None:
         found.verdict = BitsVerdict.NOT_COMPARABLE

@@ -60,9 +60,7 @@ class Frame:
 
     @property
     def unread(self) -> bool:
-        """Returns whether it had more observations than the robot has room for, and was refused
-        whole.
-        """
+        """Returns whether it had more observations than the robot takes, and was refused."""
         return self.report is not None and not self.report.t_ns and self.report.status == FULL
 
     def within_budget(self) -> Stereo:
@@ -119,9 +117,7 @@ class Part:
         return [*taken[:first], *settings, *(limited.get(id(m), m) for m in taken[first:])]
 
     def _landmarks_without_room(self) -> list[Message]:
-        """Returns landmarks that a board refused, whose room for known ones is smaller than the
-        desk's.
-        """
+        """Returns known landmarks that a board refused, which has less room than the desk."""
         known = [m for m in self.messages if isinstance(m, Landmark) and _is_input(m)]
         refused = sum(
             isinstance(m, Report) and m.subject == Kind.LANDMARK and m.status == FULL
@@ -141,9 +137,7 @@ class RobotLog:
 
 
 def read_log(path: Path) -> RobotLog:
-    """Reads a log of inputs and outputs; raises PelorusError where it is none, and says what
-    would be.
-    """
+    """Reads a log of inputs and outputs; raises PelorusError where it is none."""
     received, counts = read_file(path)
     messages = [frame.message for frame in received]
     kinds = {message.kind for message in messages}

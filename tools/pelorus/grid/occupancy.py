@@ -153,9 +153,7 @@ def _along(covariance: Floats, direction: Floats) -> Floats:
 
 
 def _resolution(spread: Floats, points: Floats) -> float:
-    """Returns a cell size as fine as half of the landmarks and the drive's length allow, in
-    steps.
-    """
+    """Returns a cell size as fine as half of the landmarks and the drive's length allow."""
     sigma = float(np.median(np.sqrt(np.linalg.eigvalsh(spread)[:, 1])))
     fine = (step for step in RESOLUTIONS_M if step >= sigma)
     return next((step for step in fine if _cells(points, step) <= CELLS_MOST), RESOLUTIONS_M[-1])

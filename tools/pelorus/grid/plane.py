@@ -48,9 +48,7 @@ class Plane(NamedTuple):
 
 
 def choose(axes: BodyAxes, poses: Poses) -> Plane:
-    """Returns the view from above, where the body's axes define up; else the plane of largest
-    extent.
-    """
+    """Returns the view from above, if the body's axes define up; else of the largest extent."""
     if axes == BodyAxes.OTHER:
         return _largest(poses.p)
     up_B = np.array([0.0, 0.0, 1.0 if axes == BodyAxes.FORWARD_LEFT_UP else -1.0])

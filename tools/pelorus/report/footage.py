@@ -211,11 +211,11 @@ class _Artist:
     def draw(self, picture: Gray, k: int, where: Path) -> bytes:
         height, width = picture.shape
         header = self._log.header
-        due = (header.image_width_px, header.image_height_px)
-        if due[0] and (width, height) != due:
+        expected = (header.image_width_px, header.image_height_px)
+        if expected[0] and (width, height) != expected:
             raise PelorusError(
                 f"{where}: pictures of {width} x {height} pixels, and the log's are "
-                f"{due[0]} x {due[1]}: the rectified ones are expected"
+                f"{expected[0]} x {expected[1]}: the rectified ones are expected"
             )
         scale = WIDTH_PX / width
         size = (WIDTH_PX, round(height * scale))

@@ -56,7 +56,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
         raise ForeignFileError(
             content.path,
             f"has {len(cameras)} cameras and {len(poses)} of T_imu_cam",
-            due="two of each are expected",
+            expected="two of each are expected",
         )
     lenses = [
         _lens(camera, sizes[k] if k < len(sizes) else [0, 0]) for k, camera in enumerate(cameras)

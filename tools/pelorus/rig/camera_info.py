@@ -52,7 +52,7 @@ class Info(NamedTuple):
                 self.path,
                 "the camera is not calibrated: K or P is 0",
                 at=self.at,
-                due="--calibration is expected",
+                expected="--calibration is expected",
             )
         size = self.width_px, self.height_px
         if rectified:
@@ -63,7 +63,7 @@ class Info(NamedTuple):
                 self.path,
                 f"distortion model {self.model!r} with {len(D)} numbers",
                 at=self.at,
-                due=f"{' or '.join(filter(None, LENSES))} is expected",
+                expected=f"{' or '.join(filter(None, LENSES))} is expected",
             )
         coefficients = tuple(D.tolist()) if D.any() else ()
         return Lens(model, (K[0, 0], K[1, 1], K[0, 2], K[1, 2]), coefficients, *size)
@@ -133,7 +133,8 @@ def pair(first: Named, second: Named, lens: LensModel | None) -> Rig:
         raise ForeignFileError(
             second.path,
             "the projection_matrix of neither camera has a baseline",
-            due="files of a stereo calibration are expected: P[3] of the right one is -fx baseline",
+            expected="files of a stereo calibration are expected: P[3] of the right one is -fx "
+            "baseline",
         )
     return infos.rig()
 

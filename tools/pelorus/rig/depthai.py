@@ -49,7 +49,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
         raise ForeignFileError(
             content.path,
             f"has {len(cameras)} camera whose place is told by another one's",
-            due="two that extrinsics join are expected",
+            expected="two that extrinsics join are expected",
         )
     stereo = [] if asked else _stereo(content, set(placed))
     rig = several.rig(content.path, cameras, asked or [str(k) for k in stereo])

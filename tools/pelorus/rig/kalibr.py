@@ -69,7 +69,7 @@ def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
     """Reads two cameras: those asked for by name or topic, else the stereo pair."""
     if "cam1" not in content:
         raise ForeignFileError(
-            content.path, "has one camera, cam0", due="cam0 and cam1 are expected"
+            content.path, "has one camera, cam0", expected="cam0 and cam1 are expected"
         )
     names = [name for name in content.content if CAMERA.fullmatch(str(name))]
     cameras = [content.object(name) for name in sorted(names, key=lambda name: int(name[3:]))]
@@ -86,9 +86,7 @@ def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
 
 
 def _chained(cameras: Sequence[Named]) -> list[Poses]:
-    """Returns maps to each camera from a common frame: the first camera, or the IMU if all name
-    it.
-    """
+    """Returns maps to each camera from the first one, or from the IMU if all name it."""
     on_body = [_on_body(camera) for camera in cameras]
     known = [T for T in on_body if T is not None]
     if len(known) == len(cameras):
@@ -97,7 +95,10 @@ def _chained(cameras: Sequence[Named]) -> list[Poses]:
     for camera in cameras[1:]:
         if STEP not in camera:
             raise ForeignFileError(
-                camera.path, "does not say where it stands", at=camera.at, due=f"{STEP} is expected"
+                camera.path,
+                "does not say where it stands",
+                at=camera.at,
+                expected=f"{STEP} is expected",
             )
         found.append(se3.compose(pose(camera, STEP), found[-1]))
     return found
@@ -121,7 +122,7 @@ def pair(first: Named, second: Named, step: Poses | None = None) -> Rig:
             raise ForeignFileError(
                 second.path,
                 f"{second.at or 'the second camera'} does not say where it stands",
-                due=f"{STEP} is expected, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of "
+                expected=f"{STEP} is expected, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of "
                 "both cameras",
             )
         steps = se3.compose(T_2B, se3.inverse(T_1B))
@@ -249,7 +250,10 @@ def _on_body(camera: Named) -> Poses | None:
         return None
     if len(given) > 1:
         raise ForeignFileError(
-            camera.path, f"has {' and '.join(given)}", at=camera.at, due="one of them is expected"
+            camera.path,
+            f"has {' and '.join(given)}",
+            at=camera.at,
+            expected="one of them is expected",
         )
     T = pose(camera, given[0])
     return T if given[0] in TO_CAMERA else se3.inverse(T)
@@ -263,7 +267,7 @@ def _require_same(second: Named, steps: Poses, other: Poses) -> None:
             f"{STEP} and the cameras' transforms to the IMU differ by "
             f"{np.linalg.norm(off[:3]):.3g} m and {np.linalg.norm(off[3:]):.3g} rad",
             at=second.at,
-            due="they should agree: is one of them of another calibration, or inverted?",
+            expected="they should agree: is one of them of another calibration, or inverted?",
         )
 
 
@@ -294,8 +298,8 @@ def _coefficients(camera: Named, model: LensModel) -> tuple[float, ...]:
     value = camera.get(name)
     found = as_numbers(value)
     if found is None or found.ndim != 1 or len(found) not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
-        raise camera.error(name, value, f"{due} numbers are expected for {model}")
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
+        raise camera.error(name, value, f"{expected} numbers are expected for {model}")
     return tuple(camera.array(name, len(found)).tolist())
 
 

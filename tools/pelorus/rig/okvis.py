@@ -48,7 +48,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
         Named(content.path, one, f"cameras[{k}]") for k, one in enumerate(content.get("cameras"))
     ]
     if len(cameras) < 2:
-        raise ForeignFileError(content.path, "has one camera", due="two are expected")
+        raise ForeignFileError(content.path, "has one camera", expected="two are expected")
     known = [
         several.RigCamera((f"cam{k}",), _lens(camera), se3.inverse(pose(camera, "T_SC")))
         for k, camera in enumerate(cameras)
@@ -75,9 +75,9 @@ def _lens(camera: Named) -> Lens:
     if model is LensModel.NONE:
         count = 0
     if count not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise camera.error(
-            name, camera.content.get(name), f"{due} numbers are expected for {model}"
+            name, camera.content.get(name), f"{expected} numbers are expected for {model}"
         )
     D = tuple(camera.array(name, count).tolist()) if count else ()
     (fx, fy), (cx, cy) = camera.array("focal_length", 2), camera.array("principal_point", 2)

@@ -61,7 +61,7 @@ def _lens(content: Named, number: int, model: LensModel | None) -> Lens:
         raise ForeignFileError(
             content.path,
             f"camera {number} has fx {fx:g}, fy {fy:g}, skew {K[0, 1]:g}",
-            due="positive focal lengths and no skew are expected",
+            expected="positive focal lengths and no skew are expected",
         )
     name = _one_of(content, DISTORTIONS, number)
     D = _numbers(content, name)
@@ -78,13 +78,15 @@ def _model(content: Named, name: str, count: int, asked: LensModel | None) -> Le
         raise ForeignFileError(
             content.path,
             f"{name} has 4 numbers, as radtan and a fisheye have",
-            due="--lens radtan or --lens equidistant is expected",
+            expected="--lens radtan or --lens equidistant is expected",
         )
     model = asked if asked in LENSES and asked is not None else LensModel.RADTAN
     if count not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise ForeignFileError(
-            content.path, f"{name} has {count} numbers", due=f"{due} are expected for {model}"
+            content.path,
+            f"{name} has {count} numbers",
+            expected=f"{expected} are expected for {model}",
         )
     return model
 
@@ -106,7 +108,7 @@ def _one_of(content: Named, patterns: tuple[str, ...], number: int) -> str:
     raise ForeignFileError(
         content.path,
         f"lacks {' or '.join(pattern.format(number) for pattern in patterns)}",
-        due=f"there are: {', '.join(content.content) or 'none'}",
+        expected=f"there are: {', '.join(content.content) or 'none'}",
     )
 
 
@@ -120,7 +122,7 @@ def xml_words(path: Path, words: str) -> dict[str, Any]:
     except ET.ParseError as error:
         raise ForeignFileError(path, f"is no XML: {error}") from None
     if root.tag != "opencv_storage":
-        raise ForeignFileError(path, f"is XML of {root.tag}", due="opencv_storage is expected")
+        raise ForeignFileError(path, f"is XML of {root.tag}", expected="opencv_storage is expected")
     return {one.tag: _value(one) for one in root}
 
 

@@ -70,13 +70,14 @@ def _pair(content: Named, T_LB: Poses | None) -> Rig:
         raise ForeignFileError(
             content.path,
             "is of one camera",
-            due=f"{' or '.join(STEPS)}, Stereo.b, LEFT.K and RIGHT.K, or Camera.bf is expected",
+            expected=f"{' or '.join(STEPS)}, Stereo.b, LEFT.K and RIGHT.K, or Camera.bf is "
+            "expected",
         )
     if any(left.coefficients):
         raise ForeignFileError(
             content.path,
             f"has a baseline alone, and a distortion ({first}.k1)",
-            due=f"{' or '.join(STEPS)} is expected; with a baseline alone the pictures are "
+            expected=f"{' or '.join(STEPS)} is expected; with a baseline alone the pictures are "
             "rectified",
         )
     plain = Lens(LensModel.NONE, left.intrinsics, (), left.width_px, left.height_px)

@@ -95,7 +95,7 @@ class Rig:
             raise ForeignFileError(
                 self.path,
                 "does not say where the camera sits on the body",
-                due="a file with T_cam_imu or T_imu_cam is expected (camchain-imucam), or "
+                expected="a file with T_cam_imu or T_imu_cam is expected (camchain-imucam), or "
                 "--extrinsic "
                 "FILE: JSON with R_CB and t_CB_m, or R_BC and t_BC_m",
             )
@@ -125,7 +125,7 @@ def rigid(path: Path, name: str, matrix: Floats) -> Poses:
     """Returns a 4 x 4 matrix as a pose; its rotation, which files round, is made exact."""
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise ForeignFileError(
-            path, f"the last row of {name} is {matrix[3]}", due="0 0 0 1 is expected"
+            path, f"the last row of {name} is {matrix[3]}", expected="0 0 0 1 is expected"
         )
     R = arrays.rotation(path, name, matrix[:3, :3])
     return Poses(se3.nearest_rotation(R), matrix[:3, 3].copy())

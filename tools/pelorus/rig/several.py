@@ -85,12 +85,14 @@ def _asked(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str]) -> tu
         if len(of_name) != 1:
             listed = ", ".join(camera.words for camera in cameras)
             raise ForeignFileError(
-                path, f"has no camera called {name}", due=f"there are: {listed} (--cameras)"
+                path, f"has no camera called {name}", expected=f"there are: {listed} (--cameras)"
             )
         found += of_name
     if len(found) != 2 or found[0] == found[1]:
         raise ForeignFileError(
-            path, f"--cameras {','.join(asked)}", due="two cameras, parted by a comma, are expected"
+            path,
+            f"--cameras {','.join(asked)}",
+            expected="two cameras, parted by a comma, are expected",
         )
     return found[0], found[1]
 

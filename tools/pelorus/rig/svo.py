@@ -46,7 +46,9 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
     """Reads two cameras: those asked for by label or number, else the stereo pair."""
     listed = content.get("cameras")
     if len(listed) < 2 or not all(isinstance(one, dict) for one in listed):
-        raise ForeignFileError(content.path, f"has {len(listed)} camera", due="two are expected")
+        raise ForeignFileError(
+            content.path, f"has {len(listed)} camera", expected="two are expected"
+        )
     each = [Named(content.path, one, f"cameras[{k}]") for k, one in enumerate(listed)]
     cameras = [_camera(one, k) for k, one in enumerate(each)]
     return replace(several.rig(content.path, cameras, asked), imu=_imu(content))
@@ -89,8 +91,8 @@ def _distortion(camera: Named) -> tuple[LensModel, tuple[float, ...]]:
     parameters = distortion.object("parameters")
     count = len(parameters.get("data"))
     if count not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise parameters.error(
-            "data", parameters.get("data"), f"{due} numbers are expected for {model}"
+            "data", parameters.get("data"), f"{expected} numbers are expected for {model}"
         )
     return model, tuple(parameters.array("data", count).tolist())

@@ -38,12 +38,12 @@ def read(contents: list[Named]) -> Rig:
         raise ForeignFileError(
             contents[0].path,
             "is of one camera, and does not say where it stands",
-            due="VINS-Fusion's configuration (body_T_cam0, cam0_calib) is expected with it",
+            expected="VINS-Fusion's configuration (body_T_cam0, cam0_calib) is expected with it",
         )
     config = configs[0]
     if config.number("num_of_cam") != 2:
         raise ForeignFileError(
-            config.path, "is not of two cameras", due="num_of_cam: 2 is expected"
+            config.path, "is not of two cameras", expected="num_of_cam: 2 is expected"
         )
     T_B1, T_B2 = (pose(config, f"body_T_{camera}") for camera in CAMERAS)
     T_21 = se3.compose(se3.inverse(T_B2), T_B1)

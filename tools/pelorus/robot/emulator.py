@@ -28,9 +28,7 @@ ELF = b"\x7fELF"
 
 
 def image_of(board: str) -> Path:
-    """Returns the firmware that tools/robot-demo.sh builds: below this folder, or in the source
-    tree.
-    """
+    """Returns the firmware of tools/robot-demo.sh: below this folder, or in the source tree."""
     if board not in MACHINES:
         raise PelorusError(f"there is no board {board}; QEMU can be {', '.join(MACHINES)}")
     name = IMAGES / f"pelorus-{board}-n32.elf"

@@ -27,9 +27,7 @@ class FlightLog:
         self._settled = False  # the settings are in the log, or will not come
 
     def keep(self, message: Message, heard: bool = False) -> None:
-        """Adds a message that was sent, or received from the board, whose CONFIG has the
-        settings.
-        """
+        """Adds a message that was sent, or received from the board: CONFIG has the settings."""
         if heard and isinstance(message, Config) and message.build_fingerprint:
             self._write(message)
             self.release()

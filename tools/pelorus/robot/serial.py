@@ -17,9 +17,7 @@ from pelorus.robot.link import Link
 
 
 def open_serial(device: Path, baud: int) -> Link:
-    """Opens a serial device, raw: 8 data bits, no parity, 1 stop bit, no flow control of its
-    own.
-    """
+    """Opens a serial device, raw: 8 data bits, no parity, 1 stop bit, no flow control."""
     speed = getattr(termios, f"B{baud}", None) if baud else None  # B0 would hang up
     if speed is None:
         raise PelorusError(f"{device}: this system knows no {baud} baud; the boards run at 921600")

@@ -11,9 +11,7 @@ from pelorus.schema import HEALTHS, REASONS, STATUSES
 
 
 def condition(health: int, reasons: int) -> str:
-    """Returns health with its reasons (`plr_health`, `plr_reason`): "degraded (the gate is
-    locked)".
-    """
+    """Returns `plr_health` with its `plr_reason`: "degraded (the gate is locked)"."""
     words = [text for reason, text in REASONS.items() if reasons & reason]
     name = HEALTHS.get(health, f"health {health}")
     return f"{name} ({', '.join(words)})" if words else name

@@ -229,9 +229,7 @@ class Streamer:
             raise PelorusError(self.outcome.state_trouble)
 
     def _why_not(self, answer: Report, words_before: int) -> str:
-        """Returns the board's own words since the request, if there are any; empty if all is
-        well.
-        """
+        """Returns the board's own words since the request; empty if all is well."""
         if answer.status == 0:
             return ""
         words = [text.text for text in self.outcome.texts[words_before:] if text.severity]

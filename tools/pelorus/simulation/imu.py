@@ -139,8 +139,8 @@ class ImuFaults:
             require(given, getattr(part, given, None), good, "--imu-rate beside it")
         parts = [part.strip() for part in self.imu_axes.split(",")]
         sound = sorted(part.removeprefix("-") for part in parts) == list(AXES)
-        due = "x, y and z in some order, with or without -, parted by commas,"
-        require("imu_axes", self.imu_axes, sound, due)
+        expected = "x, y and z in some order, with or without -, parted by commas,"
+        require("imu_axes", self.imu_axes, sound, expected)
 
     @property
     def mounting(self) -> Floats:

@@ -82,8 +82,8 @@ class Mishaps:
         """Refuses contradictory options, by the option's name."""
         settings.check(self)
         going = bool(self.moving_speed_mps or self.convoy)
-        due = "--moving-speed or --convoy, which say how they move"
-        require("moving", self.moving, going or not self.moving, due)
+        expected = "--moving-speed or --convoy, which say how they move"
+        require("moving", self.moving, going or not self.moving, expected)
         require("moving", self.moving, bool(self.moving) or not going, "the share that moves")
 
     def check_beside(self, an_imu: bool) -> None:

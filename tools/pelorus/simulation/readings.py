@@ -47,15 +47,15 @@ class Sensing:
             require(f"{name}_{first}", given, not first, f"--{name}-rate beside it")
             return
         ratio = twist_rate_hz / self.rate_hz
-        due = f"a whole part of the twist rate, {twist_rate_hz:g},"
-        require(f"{name}_rate_hz", self.rate_hz, round(ratio) == ratio >= 1, due)
+        expected = f"a whole part of the twist rate, {twist_rate_hz:g},"
+        require(f"{name}_rate_hz", self.rate_hz, round(ratio) == ratio >= 1, expected)
         letters = self.letters_of(sensor)
         good = len(set(letters)) == len(letters) and set(letters) <= set(sensor.letters)
         require(f"{name}_axes", self.axes, good, f"some of the letters {sensor.letters}")
         count = len(sensor.columns)
         sound = all(NOT_NEGATIVE.holds(x) and x > 0 for x in self.sigma)
-        due = f"one positive number, or {count} parted by commas,"
-        require(f"{name}_sigma", self.sigma, sound and len(self.sigma) in (0, 1, count), due)
+        expected = f"one positive number, or {count} parted by commas,"
+        require(f"{name}_sigma", self.sigma, sound and len(self.sigma) in (0, 1, count), expected)
         sound = all(map(math.isfinite, self.at_m)) and len(self.at_m) in (0, 3)
         require(f"{name}_at_m", self.at_m, sound, "three numbers of metres, parted by commas,")
 

@@ -15,9 +15,7 @@ OUTLIER_DISPARITY_MAX_PX = 60.0
 
 
 def biases(sigma: float, walk: float, tau_s: Floats, chance: np.random.Generator) -> Floats:
-    """Returns (n, 3) biases: drawn once, then a random walk with variance `walk` (unit^2/s) a
-    second.
-    """
+    """Returns (n, 3) biases: drawn once, then a random walk of `walk` (unit^2/s)."""
     first = sigma * chance.standard_normal(3)
     steps = np.sqrt(walk * tau_s)[:, None] * chance.standard_normal((len(tau_s), 3))
     out = np.empty((len(tau_s) + 1, 3))

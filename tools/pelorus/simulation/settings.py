@@ -39,7 +39,7 @@ class Rule(NamedTuple):
     """A limit of a number: as a test, and in words."""
 
     holds: Callable[[float], bool]
-    due: str
+    expected: str
 
 
 POSITIVE = Rule(lambda x: 0 < x < math.inf, "a positive number")
@@ -91,19 +91,17 @@ def settings_of(given: Any) -> dict[str, OptionField]:
 
 
 def option_name(name: str) -> str:
-    """Returns the option of a field: duration_s is --duration, slip_span --slip-from and
-    --slip-for.
-    """
+    """Returns the option of a field: duration_s is --duration, slip_span --slip-from, -for."""
     for unit in (*UNITS, "_span"):
         name = name.removesuffix(unit)
     return "--" + name.replace("_", "-")
 
 
-def require(name: str, value: object, good: bool, due: str) -> None:
+def require(name: str, value: object, good: bool, expected: str) -> None:
     """Refuses a value by its option's name, unless it is good."""
     if not good:
         shown = ",".join(f"{x:g}" for x in value) if isinstance(value, tuple) else value
-        raise PelorusError(f"{option_name(name)} is {shown}: {due} is expected")
+        raise PelorusError(f"{option_name(name)} is {shown}: {expected} is expected")
 
 
 def check(given: Any, prefix: str = "") -> None:
@@ -113,6 +111,6 @@ def check(given: Any, prefix: str = "") -> None:
         if isinstance(value, Span):
             for end, time_s in (("from", value.from_s), ("for", value.for_s)):
                 stem = name.removesuffix("_span")
-                require(f"{stem}_{end}", time_s, TIME.holds(time_s), TIME.due)
+                require(f"{stem}_{end}", time_s, TIME.holds(time_s), TIME.expected)
         elif about.rule is not None and value is not None:
-            require(prefix + name, value, about.rule.holds(value), about.rule.due)
+            require(prefix + name, value, about.rule.holds(value), about.rule.expected)

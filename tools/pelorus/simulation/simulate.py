@@ -129,15 +129,15 @@ class Options:
             self.readings[sensor.name].check(sensor, self.twist_rate_hz)
         ratio = self.twist_rate_hz / self.frame_rate_hz
         whole = round(ratio) == ratio >= 1
-        due = "a whole multiple of the frame rate"
-        require("twist_rate_hz", self.twist_rate_hz, whole, due)
+        expected = "a whole multiple of the frame rate"
+        require("twist_rate_hz", self.twist_rate_hz, whole, expected)
         short = self.frames <= FRAMES_MAX
         require("duration_s", self.duration_s, short, f"at most {FRAMES_MAX} frames")
         within = self.frame_lead_ns * self.twist_rate_hz < 1e9
         require("frame_lead_ns", self.frame_lead_ns, within, "less than from one twist to the next")
         turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
-        due = f"at most {TURN_MAX_RAD} rad a twist"
-        require("lap_s", self.lap_s, turn < TURN_MAX_RAD, due)
+        expected = f"at most {TURN_MAX_RAD} rad a twist"
+        require("lap_s", self.lap_s, turn < TURN_MAX_RAD, expected)
 
     @property
     def small_sensors(self) -> list[SmallSensor]:
@@ -178,9 +178,7 @@ class Options:
 
     @property
     def lookahead_s(self) -> float:
-        """Returns how far beyond the drive's end landmarks are needed, for the camera looks
-        ahead.
-        """
+        """Returns how far beyond the drive's end landmarks are needed: the camera looks ahead."""
         return min(self.range_m / self.speed_mps, self.lap_s) if self.speed_mps else 0.0
 
 

@@ -193,14 +193,16 @@ def _await_viewer() -> None:
 def _require_viewer(url: str) -> None:
     """Refuses a URL without a viewer, for which the SDK would wait for ever."""
     forms = " or ".join(SCHEMES)
-    due = PelorusError(f"{url}: is no viewer's address: {forms}://HOST:{PORT}/proxy is expected")
+    expected = PelorusError(
+        f"{url}: is no viewer's address: {forms}://HOST:{PORT}/proxy is expected"
+    )
     try:
         at = urlsplit(url)
         port = at.port or PORT
     except ValueError:
-        raise due from None
+        raise expected from None
     if at.scheme not in SCHEMES or at.hostname is None:
-        raise due
+        raise expected
     try:
         socket.create_connection((at.hostname, port), CONNECT_S).close()
     except OSError as error:
