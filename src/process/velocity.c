@@ -157,7 +157,6 @@ static bool contradicts(const plr_belief *belief, const plr_source *source, cons
 static void fuse_one(const plr_belief *belief, plr_source *source, plr_held_velocity *held,
                      plr_real seconds, plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
                      plr_real T[PLR_POSE_SQUARE]) {
-    PLR_ASSERT(seconds > PLR_R(0));
     plr_real Kt[PLR_ROWS * PLR_POSE_DIM], Y[PLR_ROWS * PLR_POSE_DIM] = {0};
     plr_real S[9], U[6], e[PLR_ROWS], R[PLR_ROWS];
     compare(held, seconds, xi, V, Kt, R, e, S);

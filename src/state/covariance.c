@@ -10,7 +10,6 @@
 #include "state/sensitivity.h"
 
 PLR_SELDOM void plr_covariance_begin(plr_belief *belief, plr_block_id block, const double *P_own) {
-    PLR_ASSERT(belief->count == 0);
     const unsigned row = plr_row_of(belief, block), size = plr_block_size(belief, block);
     plr_sensitivity_clear(belief, row, size);
     for (unsigned i = row; i < plr_core_dim(belief); i++)
@@ -34,7 +33,6 @@ void plr_covariance_begin_diagonal(plr_belief *belief, plr_block_id block, const
 
 PLR_SELDOM void plr_covariance_set(plr_belief *belief, plr_block_id rows, plr_block_id columns,
                                    const plr_real *P) {
-    PLR_ASSERT(plr_row_of(belief, rows) > plr_row_of(belief, columns));
     PLR_ASSERT(plr_row_of(belief, rows) > plr_row_of(belief, columns));
     for (unsigned i = 0; i < plr_block_size(belief, rows); i++)
         for (unsigned j = 0; j < plr_block_size(belief, columns); j++)

@@ -5,7 +5,6 @@
 
 #include "math/dense.h"
 #include "math/small.h"
-#include "pelorus/assertions.h"
 
 /* s: the weight of the pose's correction beside the landmarks'. Measured: docs/NUMERICS.md 10. */
 #define SHARE_OF_POSE PLR_R(0.1)
@@ -18,7 +17,6 @@
 
 void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
                        const plr_real w[3], const plr_real W[3]) {
-    PLR_ASSERT(W[0] >= PLR_R(0) && W[1] >= PLR_R(0) && W[2] >= PLR_R(0));
     fit->landmarks++;
     for (unsigned row = 0; row < 3; row++, J += PLR_POSE_DIM) {
         plr_real weighted[PLR_POSE_DIM];
