@@ -5,7 +5,7 @@
 # usage: tools/test.sh [--quick | --long]
 #
 #   --quick   one compiler, without sanitizers, portable build and microcontroller
-#   --long    adds the tests that take minutes (PELORUS_LONG=1)
+#   --long    adds the tests that take minutes, and draws statistics more than once (PELORUS_LONG=1)
 #
 # Real recordings are looked for in $PELORUS_DATA, by default ../shared/data; tests that need an
 # absent one are skipped, saying so. The last line counts what passed and failed.
@@ -244,10 +244,12 @@ if [ $extent != quick ]; then
     # Of these two nothing is installed, and no library built that nothing links.
     step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
-    # Another compiler, and without a fused multiply-add instruction. Every test is built, for its warnings;
-    # the golden tests and the units are run. Where they compute the same bits, so would the long drives.
+    # Another compiler, and without a fused multiply-add instruction. Where the golden tests and the units
+    # compute the same bits, so would the long drives: they are built with --long alone, for their warnings.
+    kinds=()
+    [ $extent = long ] || kinds=('-DPELORUS_TEST_KINDS=unit;golden')
     step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_INSTALL=OFF \
-        -DPELORUS_TEST_BLOCKS=OFF -DCMAKE_C_COMPILER="$clang" &&
+        -DPELORUS_TEST_BLOCKS=OFF "${kinds[@]+"${kinds[@]}"}" -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
     step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2

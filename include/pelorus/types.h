@@ -33,7 +33,7 @@ typedef enum plr_status {
     PLR_E_FULL = -10,       /* no slot is free, or a device is too small for the state */
     PLR_E_EXISTS = -11,     /* a landmark of this id is in the state already */
     PLR_E_DIVERGED = -12,   /* a variance is not positive: no estimate, nothing to save */
-    PLR_E_NOT_READY = -13,  /* the filter is not initialised, or the session has no HEADER yet */
+    PLR_E_NOT_READY = -13,  /* no init, HEADER or start of an IMU yet */
     PLR_E_CPU = -14,        /* the processor flushes subnormals to zero */
     PLR_E_CORRUPT = -15,    /* stored bytes fail their check */
     PLR_E_FOREIGN = -16,    /* the data was made by another version or build; for a saved state

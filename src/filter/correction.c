@@ -9,6 +9,7 @@
 #include "math/small.h"
 #include "pelorus/assertions.h"
 #include "process/velocity.h"
+#include "sensor/kept.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
 #include "state/calibration.h"

@@ -27,7 +27,7 @@ typedef struct plr_correction {
     bool moved;                /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 
-/* Applies the measurements that were kept (sensor/measurement.h) of the rows of a frame that are to be
+/* Applies the measurements that were kept (sensor/kept.h) of the rows of a frame that are to be
  * used, then the `given` ones, and the information about the biases that velocities have added since the
  * last correction (process/velocity.h). All are linearised at the current estimate, and the estimate is
  * corrected once, at the end. PLR_E_DIVERGED if a variance would not be positive or the correction is not

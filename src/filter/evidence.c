@@ -31,7 +31,7 @@ static uint32_t hash_of_pixels(const plr_observation *o) {
 }
 
 void plr_evidence_of_picture(plr_filter *f, const plr_sightings *sightings) {
-    plr_picture_evidence *e = &f->work.evidence.picture;
+    plr_picture_evidence *e = &f->evidence.picture;
     for (unsigned k = 0; k < sightings->count; k++) {
         const plr_sighting *row = &sightings->at[k];
         if (!plr_is_matched(row))
@@ -53,7 +53,7 @@ void plr_evidence_note_pose(const plr_filter *f, plr_evidence_pose *pose) {
 void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
                             const plr_applied_motion *stated, const plr_motion_first *first,
                             const plr_correction *correction) {
-    plr_motion_evidence *e = &f->work.evidence.motion;
+    plr_motion_evidence *e = &f->evidence.motion;
     e->applied = true;
     e->outright = first->outright;
     memcpy(e->E, first->motion.E, sizeof e->E);
@@ -68,7 +68,7 @@ void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
 
 bool plr_evidence_before_map(plr_filter *f, const plr_sightings *sightings,
                              plr_evidence_pose *before) {
-    plr_map_evidence *e = &f->work.evidence.map;
+    plr_map_evidence *e = &f->evidence.map;
     for (unsigned k = 0; k < sightings->count; k++)
         e->known += plr_is_of_known(&f->belief, &sightings->at[k]);
     if (e->known == 0 || f->config.model != PLR_MODEL_BODY)
@@ -79,8 +79,8 @@ bool plr_evidence_before_map(plr_filter *f, const plr_sightings *sightings,
 }
 
 void plr_evidence_after_map(plr_filter *f, const plr_evidence_pose *before) {
-    plr_map_evidence *e = &f->work.evidence.map;
-    e->adopted = f->work.evidence.events.adopted;
+    plr_map_evidence *e = &f->evidence.map;
+    e->adopted = f->evidence.events.adopted;
     memcpy(e->R_WB, f->belief.R_WB, sizeof e->R_WB);
     plr_pose_moved_from(&f->belief, before->R_WB, before->p_WB, e->moved);
     plr_motion_pose_covariance(&f->belief, &f->motion, e->P_after);
@@ -101,7 +101,7 @@ static void add_biases(plr_filter *f, plr_bias_evidence *e) {
 }
 
 void plr_evidence_complete(plr_filter *f, plr_sightings *sightings) {
-    plr_frame_evidence *e = &f->work.evidence;
+    plr_frame_evidence *e = &f->evidence;
     for (unsigned k = 0; k < sightings->count; k++)
         if (plr_gate_rejected(&sightings->at[k]))
             sightings->at[k].slot = plr_slots_find(&f->belief, sightings->at[k].seen->id);
@@ -139,7 +139,7 @@ plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *told) {
         return sound;
     if (f->totals.frames == 0)
         return PLR_E_NOT_READY;
-    plr_supervise_tell(&f->supervisor, &f->work.evidence, told);
+    plr_supervise_tell(&f->supervisor, &f->evidence, told);
     for (unsigned slot = 0; slot < f->belief.count; slot++) {
         const plr_slot *s = &f->belief.slots[slot];
         const plr_real variance = s->innovation_variance;

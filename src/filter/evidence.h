@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What the supervisor is told of a frame (pelorus/supervisor.h), in work.evidence. */
+/* What the supervisor is told of a frame (pelorus/supervisor.h), in evidence. */
 #ifndef PLR_FILTER_EVIDENCE_H
 #define PLR_FILTER_EVIDENCE_H
 

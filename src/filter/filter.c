@@ -146,18 +146,6 @@ static void start_covariance(const plr_filter *f, double P_xi[PLR_POSE_SQUARE]) 
         P_xi[(PLR_POSE_DIM + 1) * i] = sigma * sigma;
 }
 
-void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
-    plr_velocity_forget_bias(&f->source);
-    plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_BIAS, variance);
-}
-
-void plr_filter_begin_velocity(plr_filter *f) {
-    const double v = (double)f->source.start_velocity_variance;
-    const double variance[PLR_VELOCITY_DIM] = {v, v, v};
-    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY))
-        plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_VELOCITY, variance);
-}
-
 static void set_bias_prior(plr_filter *f, const double mean[PLR_POSE_DIM],
                            const double variance[PLR_POSE_DIM]) {
     for (int i = 0; i < PLR_POSE_DIM; i++) {
@@ -224,15 +212,6 @@ void plr_filter_forget_reading(plr_filter *f) {
     f->source.reading_valid = 0;
     f->source.interval_s = 0;
     plr_process_of(&f->source)->rest(&f->belief, &f->source, f->source.reading);
-}
-
-plr_status plr_filter_refuse(plr_filter *f, plr_status status) {
-    if (status == PLR_E_LATE)
-        f->totals.late++;
-    else
-        f->totals.refused++;
-    plr_guard_seal(f);
-    return status;
 }
 
 static plr_status check_pose(const plr_pose *T_WB) {

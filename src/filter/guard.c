@@ -180,3 +180,12 @@ void plr_guard_seal_whole(plr_filter *f) {
 void plr_guard_seal_constant(plr_filter *f) {
     f->guard.constant = constant_sum(f);
 }
+
+plr_status plr_filter_refuse(plr_filter *f, plr_status status) {
+    if (status == PLR_E_LATE)
+        f->totals.late++;
+    else
+        f->totals.refused++;
+    plr_guard_seal(f);
+    return status;
+}

@@ -113,11 +113,11 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
 
 /* ---------------------------------------------------------------- frames and the start */
 
-/* A point has moved if the square of its way in the picture exceeds so many times what is due of two
+/* A point has moved if the square of its way in the picture exceeds so many times what is expected of two
  * still pixels in two directions: of still ones it is one in a thousand. */
 #define MOVED_ABOVE PLR_R(7)
 
-/* What is due, px^2: pixels have noise, and tracks have wandered since the stretch began. */
+/* What is expected, px^2: pixels have noise, and tracks have wandered since the stretch began. */
 static plr_real still2(const plr_filter *f, const plr_observation *seen) {
     const plr_alignment *at = &f->source.either.alignment;
     const plr_real seconds = at->count > 0 ? plr_seconds(f->belief.t_ns - at->begin_ns) : PLR_R(0);

@@ -8,6 +8,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "process/process.h"
+#include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/calibration.h"
 #include "state/covariance.h"
@@ -25,6 +26,18 @@ static void unpack(const plr_filter *f, plr_real P[PLR_POSE_SQUARE]) {
     for (unsigned i = 0, at = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j <= i; j++, at++)
             P[PLR_POSE_DIM * i + j] = P[PLR_POSE_DIM * j + i] = f->recovery_P[at];
+}
+
+void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
+    plr_velocity_forget_bias(&f->source);
+    plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_BIAS, variance);
+}
+
+void plr_filter_begin_velocity(plr_filter *f) {
+    const double v = (double)f->source.start_velocity_variance;
+    const double variance[PLR_VELOCITY_DIM] = {v, v, v};
+    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY))
+        plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_VELOCITY, variance);
 }
 
 void plr_filter_store_for_recovery(plr_filter *f) {

@@ -25,7 +25,9 @@
 #include "process/alignment.h"
 #include "process/process.h"
 #include "process/velocity.h"
+#include "sensor/kept.h"
 #include "sensor/sensor.h"
+#include "sensor/standstill.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
 #include "state/calibration.h"
@@ -204,7 +206,7 @@ static plr_status correct(plr_filter *f, plr_sightings *frame, plr_search_decisi
     report->innovation_rows = (uint16_t)correction.innovation.rows;
     report->innovation_d2 = (float)correction.innovation.d2;
     report->innovation_log_det = (float)correction.innovation.log_det;
-    f->work.evidence.events.cut = correction.cut;
+    f->evidence.events.cut = correction.cut;
     if (sees_map && correction.status == PLR_OK)
         plr_evidence_after_map(f, &before);
     return correction.status;
@@ -257,7 +259,7 @@ static plr_status take_up_known(plr_filter *f, plr_sightings *frame, plr_frame_e
 /* After the correction: a lock is undone, and landmarks begin. */
 static plr_status renew_landmarks(plr_filter *f, plr_sightings *frame,
                                   const plr_search_decision *decision, plr_report *report) {
-    plr_frame_events *events = &f->work.evidence.events;
+    plr_frame_events *events = &f->evidence.events;
     plr_status status = PLR_OK;
     plr_relocate_watch(f, frame, events->unplaced);
     if (decision->drop_rejected) {
@@ -291,11 +293,11 @@ static void keep_position_and_heading(const plr_filter *f, plr_real C[PLR_POSE_S
 static void carry_out(plr_filter *f, plr_sightings *frame, plr_report *report) {
     plr_frame_decision decision;
     plr_evidence_complete(f, frame);
-    plr_supervise_frame(&f->supervisor, &f->work.evidence, report, &decision);
+    plr_supervise_frame(&f->supervisor, &f->evidence, report, &decision);
     report->health = decision.health;
     report->reasons = decision.reasons;
     f->totals.contradictions += decision.contradicted_now;
-    f->totals.range_limited += f->work.evidence.events.cut;
+    f->totals.range_limited += f->evidence.events.cut;
     if (report->used > 0)
         plr_filter_store_for_recovery(f);
     if (!decision.covers)
@@ -309,7 +311,7 @@ static void carry_out(plr_filter *f, plr_sightings *frame, plr_report *report) {
 
 /* Recovers, and makes landmarks of what is seen. */
 static void recover(plr_filter *f, plr_sightings *frame, plr_report *report) {
-    plr_frame_events *events = &f->work.evidence.events;
+    plr_frame_events *events = &f->evidence.events;
     plr_filter_recover(f);
     events->recovered = true;
     plr_match_slots(f, frame);
@@ -321,9 +323,9 @@ static plr_status estimate(plr_filter *f, plr_sightings *frame, plr_report *repo
     plr_search_decision decision = {false, false, false, false};
     plr_status status = PLR_OK;
     const bool frozen = f->config.model == PLR_MODEL_BODY &&
-                        !plr_supervise_picture(&f->supervisor, &f->work.evidence.picture);
+                        !plr_supervise_picture(&f->supervisor, &f->evidence.picture);
     if (!frozen)
-        status = take_up_known(f, frame, &f->work.evidence.events, report);
+        status = take_up_known(f, frame, &f->evidence.events, report);
     if (status != PLR_OK)
         return status;
     let_tracks_drift(f);
@@ -333,8 +335,9 @@ static plr_status estimate(plr_filter *f, plr_sightings *frame, plr_report *repo
     }
     plr_reading still;
     plr_reading_result unused = {0};
-    const bool stands = f->source.reading_valid &&
-                        plr_standstill_is_seen(&f->belief, &f->camera, &f->config, frame, &still);
+    const bool stands =
+        f->source.reading_valid && plr_standstill_is_seen(&f->belief, &f->camera, frame,
+                                                          f->config.standstill_sigma_mps, &still);
     const bool is_state = plr_process_of(&f->source)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
@@ -453,7 +456,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     plr_predict_to(f, frame->t_ns);
     f->belief.frame_number++;
     f->totals.frames++;
-    memset(&f->work.evidence, 0, sizeof f->work.evidence);
+    memset(&f->evidence, 0, sizeof f->evidence);
     note_twist(f);
     if (!plr_process_has_started(&f->source)) {
         wait_for_start(f, frame, r);

@@ -5,6 +5,9 @@
 #define PLR_KNOWN_MAP_FIND_H
 
 #include "known_map/placing.h"
+#include "pelorus/belief.h"
+#include "pelorus/map.h"
+#include "pelorus/workspace.h"
 
 /* A pose that known landmarks in sight agree on. */
 typedef struct plr_found_pose {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "known_map/lookup.h"
 
+#include <stddef.h>
+
 #include "math/validate.h"
 
 bool plr_map_is_asked(const plr_config *config, const plr_map *map) {

@@ -5,7 +5,8 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/map.h"
+#include "pelorus/settings.h"
 
 /* True in the modes that ask the map source for landmarks, if there is one. */
 bool plr_map_is_asked(const plr_config *config, const plr_map *map);

@@ -7,7 +7,7 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/camera.h"
 
 enum {
     PLR_PLACING_LEAST = 4, /* points: three tell a pose, the fourth confirms it */

@@ -8,7 +8,9 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/settings.h"
+#include "pelorus/source.h"
 
 /* Not started, nothing averaged. */
 void plr_alignment_clear(const plr_belief *belief, plr_source *source);
@@ -40,7 +42,7 @@ void plr_alignment_watch_gravity(const plr_belief *belief, plr_source *source);
  * position and yaw are not free any more, and an anchor would lose what is known of them. */
 void plr_alignment_keep_world(plr_source *source);
 
-/* The clock is about to be set from f->belief.t_ns to t_ns: the time since the start stays what it is. */
+/* The clock is about to be set from belief->t_ns to t_ns: the time since the start stays what it is. */
 void plr_alignment_follow_clock(const plr_belief *belief, plr_source *source, plr_time_ns t_ns);
 
 /* True between a start in motion and the anchor: errors of second order are not in P yet. */

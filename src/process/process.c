@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "process/process.h"
 
+#include "pelorus/assertions.h"
 #include "state/seconds.h"
 
 /* The largest step, m and rad. The series of SO(3) are accurate up to this angle. */
@@ -8,6 +9,8 @@
 #define MAX_TURN PLR_R(3.1415926)
 
 void plr_lay_out(plr_belief *belief, uint8_t velocity, uint8_t bias, uint8_t driver) {
+    PLR_ASSERT(driver <= PLR_POSE_DIM + velocity + bias &&
+               PLR_POSE_DIM + velocity + bias <= PLR_CORE_DIM);
     const uint8_t size[PLR_BLOCKS] = {PLR_POSE_DIM, velocity, bias};
     uint8_t row = 0;
     for (unsigned block = 0; block < PLR_BLOCKS; block++) {

@@ -2,13 +2,16 @@
 /*
  * A process moves the state between frames by readings of six numbers, linear ones first. It lays
  * out the blocks that it needs, carries pose (and velocity) along with each reading, and
- * accumulates in f->motion what a frame will apply to P: a reading costs the same for any number of
+ * accumulates in plr_motion what a frame will apply to P: a reading costs the same for any number of
  * landmarks.
  */
 #ifndef PLR_PROCESS_PROCESS_H
 #define PLR_PROCESS_PROCESS_H
 
-#include "pelorus/state.h"
+#include "pelorus/assertions.h"
+#include "pelorus/belief.h"
+#include "pelorus/settings.h"
+#include "pelorus/source.h"
 #include "state/rows.h"
 
 enum { PLR_READING_DIM = PLR_POSE_DIM };
@@ -117,6 +120,7 @@ static inline void plr_process_walk(plr_belief *belief, const plr_source *source
 
 /* The variance of bias k about its prior's mean, had nothing been learnt of it: it has walked. */
 static inline plr_real plr_bias_prior_variance(const plr_source *source, unsigned k) {
+    PLR_ASSERT(k < PLR_BIAS_DIM);
     const plr_real sigma = source->bias_prior_sigma[k], seconds = (plr_real)source->bias_walked_s;
     return sigma * sigma + seconds * plr_process_of(source)->bias_walk(source, k);
 }

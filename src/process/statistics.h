@@ -7,7 +7,8 @@
 #ifndef PLR_PROCESS_STATISTICS_H
 #define PLR_PROCESS_STATISTICS_H
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/source.h"
 
 /* The squared differences from the last reading, of the linear and of the angular three numbers. */
 void plr_statistics_change(const plr_source *source, const plr_real reading[PLR_POSE_DIM],

@@ -6,6 +6,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -112,6 +113,7 @@ static void hold(const plr_belief *belief, const plr_source *source, plr_real ag
 /* The square of by how much a velocity is off that is held for n usual intervals: what readings
  * differ by beyond their noise, later what they scatter by. `which`: 0 linear, 1 angular. */
 static plr_real off2(const plr_source *source, unsigned which, plr_real n) {
+    PLR_ASSERT(which < 2 && n > PLR_R(0));
     const plr_real *v = which == 0 ? source->velocity_variance : source->gyro_variance;
     const plr_real noise = (v[0] + v[1] + v[2]) / PLR_R(3);
     const plr_real change = source->inertial.change2[which] - PLR_R(2) * noise;

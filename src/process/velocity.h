@@ -11,7 +11,8 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/source.h"
 #include "state/rows.h"
 
 /* Holds rows from now on, at index `which` < PLR_HELD_VELOCITIES. The interval of a sensor's first

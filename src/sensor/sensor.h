@@ -6,7 +6,8 @@
 #ifndef PLR_SENSOR_SENSOR_H
 #define PLR_SENSOR_SENSOR_H
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/types.h"
 #include "sensor/measurement.h"
 
 /* A kind of sensor: one of the two functions, the other is NULL. The reading has been checked:
@@ -16,7 +17,7 @@ typedef struct plr_sensor_kind {
     void (*of_state)(const plr_belief *belief, const plr_reading *reading, plr_measurement *m);
 
     /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how
-     * many times. They are held in f->source.either.velocities.held[place] and after it. */
+     * many times. They are held in plr_velocities.held[place] and after it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 
@@ -35,12 +36,6 @@ const plr_sensor_kind *plr_sensor_of(unsigned sensor);
 static inline bool plr_reading_has(const plr_reading *reading, unsigned i) {
     return (reading->axes >> i & 1U) != 0;
 }
-
-/* Looks for a standstill in a frame: true, with the reading, if for a second no pixel moved by more than
- * its noise. */
-bool plr_standstill_is_seen(plr_belief *belief, const plr_camera_model *camera,
-                            const plr_config *config, const plr_sightings *sightings,
-                            plr_reading *reading);
 
 #define SENSOR(number, kind, about) extern const plr_sensor_kind kind;
 #include "sensor/sensors.def"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* The body rests: v = 0 with sigma[0], m/s, w = 0 with sigma[1], rad/s, each if in `axes`. */
+#include "sensor/standstill.h"
+
 #include <string.h>
 
 #include "sensor/sensor.h"
@@ -78,10 +80,10 @@ static bool is_still(plr_belief *belief, const plr_camera_model *camera,
 }
 
 bool plr_standstill_is_seen(plr_belief *belief, const plr_camera_model *camera,
-                            const plr_config *config, const plr_sightings *sightings,
+                            const plr_sightings *sightings, double sigma_mps,
                             plr_reading *reading) {
     unsigned old_rows;
-    if (config->standstill_sigma_mps <= 0)
+    if (sigma_mps <= 0)
         return false;
     if (!is_still(belief, camera, sightings, &old_rows)) {
         for (unsigned slot = 0; slot < belief->count; slot++)
@@ -92,6 +94,6 @@ bool plr_standstill_is_seen(plr_belief *belief, const plr_camera_model *camera,
     reading->t_ns = belief->t_ns;
     reading->sensor = PLR_SENSOR_STANDSTILL;
     reading->axes = 3;
-    reading->sigma[0] = reading->sigma[1] = config->standstill_sigma_mps;
+    reading->sigma[0] = reading->sigma[1] = sigma_mps;
     return old_rows >= MIN_ROWS;
 }

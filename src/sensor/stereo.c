@@ -151,6 +151,7 @@ static void empty_row(plr_measurement *m) {
 
 bool plr_stereo_measure(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                         const plr_observation *seen, plr_measurement *m) {
+    PLR_ASSERT(slot < belief->count);
     const plr_camera *eye = &camera->estimate.eye;
     plr_real z[3], along[3];
     plr_eye_view by_eye;
@@ -184,6 +185,7 @@ bool plr_stereo_measure(const plr_belief *belief, const plr_camera_model *camera
  * camera has gone on with its twist. q_eye is the same point in the camera as it is estimated. */
 static void point_by_calibration(const plr_camera_model *camera, const plr_real q[3],
                                  const plr_real q_eye[3], plr_real q_s[PLR_CALIBRATIONS][3]) {
+    PLR_ASSERT(camera->errors.count <= PLR_CALIBRATIONS);
     const plr_camera *eye = &camera->estimate.eye;
     const plr_real *p = q_eye, *u = camera->estimate.twist;
     const plr_real in_eye[PLR_CALIBRATION_ERRORS][3] = {
@@ -207,6 +209,7 @@ static void point_by_calibration(const plr_camera_model *camera, const plr_real 
 void plr_stereo_by_calibration(const plr_belief *belief, const plr_camera_model *camera,
                                unsigned slot, const plr_observation *seen,
                                plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]) {
+    PLR_ASSERT(slot < belief->count);
     plr_view view;
     plr_eye_view by_eye;
     plr_real q_s[PLR_CALIBRATIONS][3];

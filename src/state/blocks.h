@@ -7,7 +7,7 @@
 #include <stdbool.h>
 
 #include "pelorus/assertions.h"
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
 
 /* A block that the process does not estimate has no rows. */
 static inline bool plr_has_block(const plr_belief *belief, plr_block_id block) {
@@ -30,6 +30,7 @@ static inline unsigned plr_core_dim(const plr_belief *belief) {
 
 /* The first of the three rows of a landmark. */
 static inline unsigned plr_covariance_row(const plr_belief *belief, unsigned slot) {
+    PLR_ASSERT(slot <= PLR_MAX_LANDMARKS);
     return plr_core_dim(belief) + PLR_LANDMARK_DIM * slot;
 }
 

@@ -8,13 +8,15 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/camera.h"
 #include "state/pose.h"
 
 enum {
     K = PLR_CALIBRATIONS,
-    USUAL_AT_FIRST = 20 /* frames that the prior of what is usual counts */
+    USUAL_AT_FIRST = 20, /* frames that the prior of what is usual counts */
+    MOST_MISFITS = 10    /* frames that would move a number too far, until it is refused */
 };
 
 /* ---------------------------------------------------------------- the columns */
@@ -122,6 +124,18 @@ void plr_calibration_reset(plr_camera_model *camera) {
     memset(&camera->estimate, 0, sizeof camera->estimate);
     plr_calibration_forget(camera);
     plr_calibration_put_back(camera);
+}
+
+bool plr_calibration_refuses(const plr_camera_model *camera, unsigned k) {
+    PLR_ASSERT(k < PLR_CALIBRATIONS);
+    return camera->estimate.misfits[k] >= MOST_MISFITS;
+}
+
+bool plr_calibration_is_off(const plr_camera_model *camera) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&camera->errors); k++)
+        if (plr_calibration_refuses(camera, k))
+            return true;
+    return false;
 }
 
 void plr_calibration_doubt(plr_camera_model *camera) {

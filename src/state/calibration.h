@@ -13,7 +13,11 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/camera.h"
+#include "pelorus/settings.h"
+#include "pelorus/source.h"
+#include "pelorus/workspace.h"
 
 /* How many errors are estimated. Where a build has room for none the compiler sees that, and leaves out what
  * estimates them. */

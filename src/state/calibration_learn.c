@@ -7,13 +7,13 @@
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 
 enum {
     K = PLR_CALIBRATIONS,
-    MOST_SIGMAS = 5,   /* of the prior, in one correction: more is no calibration */
-    LEARNT_SIGMAS = 4, /* by which a number may have moved, of what is learnt of it */
-    MOST_MISFITS = 10  /* frames that would move it farther, until it is refused */
+    MOST_SIGMAS = 5,  /* of the prior, in one correction: more is no calibration */
+    LEARNT_SIGMAS = 4 /* by which a number may have moved, of what is learnt of it */
 };
 
 /* What a frame says of the calibration is added up over some 32 frames, seconds of a camera: slow errors
@@ -88,6 +88,7 @@ static bool correct_factor(const plr_camera_model *camera, const plr_learnt *lea
 /* x += Sigma y, of the estimated errors. */
 static void add_product(const plr_camera_model *camera, const plr_real *G, const plr_real *D,
                         const plr_real *y, plr_real *x) {
+    PLR_ASSERT(camera->errors.estimated <= camera->errors.count);
     for (unsigned k = 0; k < plr_calibration_estimated(&camera->errors); k++)
         add(k + 1, D[k] * dot(k + 1, G + K * k, y), G + K * k, x);
 }
@@ -184,10 +185,6 @@ static bool may_move(const plr_camera_model *camera, const plr_real *G, const pl
     return moved * moved <= PLR_R(LEARNT_SIGMAS * LEARNT_SIGMAS) * (learnt + LITTLE * prior);
 }
 
-bool plr_calibration_refuses(const plr_camera_model *camera, unsigned k) {
-    return camera->estimate.misfits[k] >= MOST_MISFITS;
-}
-
 /* The state and the camera as if nothing had been learnt: what was moved is no error of the calibration. A number
  * that is refused is considered from now on, and the others are learnt anew. */
 static void put_back(const plr_belief *belief, plr_camera_model *camera, plr_real *dx) {
@@ -235,6 +232,7 @@ static void leave_out_refused(const plr_camera_model *camera, plr_learnt *learnt
 
 void plr_calibration_learn(const plr_belief *belief, plr_camera_model *camera,
                            plr_workspace *work) {
+    PLR_ASSERT(camera->errors.count == belief->layout.errors);
     plr_camera_estimate *c = &camera->estimate;
     const plr_error_columns *errors = &camera->errors;
     const unsigned n = plr_calibration_estimated(errors);
@@ -258,11 +256,4 @@ void plr_calibration_learn(const plr_belief *belief, plr_camera_model *camera,
     c->excess = excess;
     plr_combine_rows(plr_covariance_dim(belief), n, ds, 1, belief->S[0], PLR_MAX_LD, work->dx);
     plr_calibration_correct(camera, ds);
-}
-
-bool plr_calibration_is_off(const plr_camera_model *camera) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&camera->errors); k++)
-        if (plr_calibration_refuses(camera, k))
-            return true;
-    return false;
 }

@@ -23,6 +23,7 @@ PLR_SELDOM void plr_covariance_begin(plr_belief *belief, plr_block_id block, con
 }
 
 void plr_covariance_begin_diagonal(plr_belief *belief, plr_block_id block, const double *variance) {
+    PLR_ASSERT(plr_block_size(belief, block) <= PLR_WIDEST_BLOCK);
     const unsigned size = plr_block_size(belief, block);
     double P_own[PLR_WIDEST_BLOCK * PLR_WIDEST_BLOCK] = {0};
     for (unsigned i = 0; i < size; i++)
@@ -90,6 +91,7 @@ void plr_covariance_add_variance(plr_belief *belief, plr_block_id block, const p
 }
 
 void plr_covariance_add_to_landmark(plr_belief *belief, unsigned slot, const plr_real C[9]) {
+    PLR_ASSERT(slot < belief->count);
     const unsigned row = plr_covariance_row(belief, slot);
     for (unsigned i = 0; i < PLR_LANDMARK_DIM; i++)
         for (unsigned j = 0; j <= i; j++)
@@ -104,20 +106,24 @@ void plr_covariance_get(const plr_belief *belief, plr_block_id rows, plr_block_i
 
 void plr_covariance_with_drivers(const plr_belief *belief, unsigned row, unsigned rows,
                                  plr_real *P) {
+    PLR_ASSERT(row + rows <= PLR_MAX_LD && belief->layout.drivers <= PLR_DRIVERS);
     plr_get_block(belief, row, rows, belief->layout.driver, belief->layout.drivers, P);
 }
 
 void plr_covariance_landmark(const plr_belief *belief, unsigned slot, plr_real P_ll[9]) {
+    PLR_ASSERT(slot < belief->count);
     const unsigned s = plr_covariance_row(belief, slot);
     plr_get_block(belief, s, 3, s, 3, P_ll);
 }
 
 plr_real plr_covariance_of_range(const plr_belief *belief, unsigned slot) {
+    PLR_ASSERT(slot < belief->count);
     const unsigned row = plr_covariance_row(belief, slot) + 2;
     return belief->P[plr_packed_at(row, row)];
 }
 
 size_t plr_covariance_size(const plr_belief *belief, unsigned landmarks) {
+    PLR_ASSERT(landmarks <= PLR_MAX_LANDMARKS);
     return plr_packed_row(plr_covariance_row(belief, landmarks));
 }
 
@@ -146,6 +152,7 @@ bool plr_covariance_is_positive(const plr_belief *belief) {
 /* ---------------------------------------------------------------- slots */
 
 PLR_SELDOM void plr_covariance_append(plr_belief *belief, const plr_new_landmark *landmark) {
+    PLR_ASSERT(belief->count < PLR_MAX_LANDMARKS);
     const unsigned s = plr_covariance_dim(belief);
     for (unsigned i = 0; i < 3; i++)
         memset(belief->P + plr_packed_row(s + i), 0, (s + i + 1) * sizeof *belief->P);
@@ -167,6 +174,7 @@ PLR_SELDOM void plr_covariance_append(plr_belief *belief, const plr_new_landmark
 }
 
 PLR_SELDOM void plr_covariance_remove(plr_belief *belief, unsigned slot) {
+    PLR_ASSERT(slot < belief->count);
     const unsigned to = plr_covariance_row(belief, slot);
     const unsigned from = plr_covariance_row(belief, belief->count - 1);
     if (to == from)

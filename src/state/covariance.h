@@ -8,7 +8,9 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/camera.h"
+#include "pelorus/workspace.h"
 #include "state/blocks.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -126,7 +128,7 @@ void plr_covariance_make_up_for_rounding(plr_belief *belief);
 
 /* --- slots --- */
 
-/* Appends the rows of slot f->belief.count (not yet counted): error = J_pose xi + N(0, landmark->P). */
+/* Appends the rows of slot belief->count (not yet counted): error = J_pose xi + N(0, landmark->P). */
 void plr_covariance_append(plr_belief *belief, const plr_new_landmark *landmark);
 
 /* Moves the rows of the last slot into those of `slot`. */

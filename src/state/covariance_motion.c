@@ -5,6 +5,7 @@
 #include "math/blocks3.h"
 #include "math/dense.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/calibration.h"
 #include "state/elements.h"
@@ -34,6 +35,7 @@ static inline void three_rows_by_six(unsigned m, const plr_real *const X[PLR_ROW
 
 /* The pose's columns of three rows of P, from row i on: X <- X A^T, with At = A^T. */
 static void turn_pose_columns(plr_belief *belief, unsigned i, const plr_real At[PLR_POSE_SQUARE]) {
+    PLR_ASSERT(i >= PLR_POSE_DIM && i + PLR_ROWS <= plr_covariance_dim(belief));
     plr_real *const row[PLR_ROWS] = {belief->P + plr_packed_row(i),
                                      belief->P + plr_packed_row(i + 1),
                                      belief->P + plr_packed_row(i + 2)};
@@ -122,6 +124,7 @@ void plr_covariance_transport(plr_belief *belief, plr_real *Vt, const plr_real A
 void plr_covariance_motion_share(const plr_belief *belief, unsigned row,
                                  const plr_real Kt[PLR_MOTION_BY],
                                  plr_real V[PLR_ROWS * PLR_POSE_DIM]) {
+    PLR_ASSERT(row + PLR_ROWS <= plr_covariance_dim(belief));
     const unsigned first = belief->layout.driver, drivers = belief->layout.drivers;
     plr_real before[PLR_ROWS * PLR_DRIVERS];
     const plr_real *X[PLR_ROWS];
@@ -153,6 +156,7 @@ static void drivers_after_motion(const plr_belief *belief, const plr_real E[9], 
 /* After the motion: v <- V x_d + noise, b <- b + noise, V by the drivers as they stand in P. */
 static void carry_core_covariance(plr_belief *belief, const plr_motion *motion,
                                   const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS]) {
+    PLR_ASSERT(plr_has_block(belief, PLR_BLOCK_VELOCITY) && plr_has_block(belief, PLR_BLOCK_BIAS));
     enum { D = PLR_DRIVERS, C = PLR_VELOCITY_DIM };
     const plr_core_motion *m = &motion->core;
     const unsigned n = plr_covariance_dim(belief), first = belief->layout.driver;

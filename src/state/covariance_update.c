@@ -5,6 +5,7 @@
 #include "math/blocks3.h"
 #include "math/dense.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "state/elements.h"
 
 PLR_SELDOM void plr_covariance_of_rows(const plr_belief *belief, const plr_rows *H, plr_real S[9]) {
@@ -33,6 +34,7 @@ PLR_SELDOM void plr_covariance_of_rows(const plr_belief *belief, const plr_rows 
 
 PLR_SELDOM void plr_covariance_add_open_noise(const plr_belief *belief, const plr_noise *noise,
                                               const plr_rows *H, plr_real S[9]) {
+    PLR_ASSERT(noise->open);
     const unsigned ld = plr_covariance_ld(belief);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real a[3];

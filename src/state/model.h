@@ -8,7 +8,10 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/camera.h"
+#include "pelorus/settings.h"
+#include "pelorus/workspace.h"
 #include "state/motion.h"
 #include "state/rows.h"
 

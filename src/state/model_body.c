@@ -5,6 +5,7 @@
  * filter is invariant: directions that nothing observes (the pose of the world) stay unobserved, so
  * that it gains no information about them from linearisation. docs/MATH.md 2 and 6.
  */
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
@@ -116,6 +117,7 @@ static void fill_W(const plr_belief *belief, const plr_camera_model *camera,
  * not change: returns the estimated inverse range minus that of the point, 1/m. */
 static plr_real move_to_linearisation_point(plr_belief *belief, const plr_camera_model *camera,
                                             const plr_noise *noise, unsigned slot) {
+    PLR_ASSERT(slot < belief->count);
     plr_slot *s = &belief->slots[slot];
     const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
     const plr_real wanted = s->beyond + noise->range_shift[slot];
@@ -131,6 +133,7 @@ static plr_real move_to_linearisation_point(plr_belief *belief, const plr_camera
 
 static bool body_look(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                       plr_view *view) {
+    PLR_ASSERT(slot < belief->count);
     memcpy(view->q, belief->slots[slot].x, sizeof view->q);
     return view->q[2] >= camera->min_depth;
 }
@@ -139,6 +142,7 @@ static bool body_look(const plr_belief *belief, const plr_camera_model *camera, 
 static void body_derive(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                         const plr_view *view, const plr_real Dz[9], const plr_real along[3],
                         plr_real z[3], plr_rows *H) {
+    PLR_ASSERT(slot < belief->count);
     (void)camera;
     plr_polar chart;
     plr_polar_at(&chart, view->q);

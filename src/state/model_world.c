@@ -4,6 +4,7 @@
  * (III.1 to III.14). It is overconfident, and in float32 its covariance can lose
  * positivity (docs/NUMERICS.md). It exists for comparison.
  */
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
@@ -31,6 +32,7 @@ static void world_propagate(plr_belief *belief, const plr_camera_model *camera,
 /* s = R^T (m - p): the landmark in the body. */
 static bool world_look(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                        plr_view *view) {
+    PLR_ASSERT(slot < belief->count);
     plr_real offset[3];
     for (int i = 0; i < 3; i++)
         offset[i] = (plr_real)((double)belief->slots[slot].x[i] - belief->p_WB[i]);
@@ -43,6 +45,7 @@ static bool world_look(const plr_belief *belief, const plr_camera_model *camera,
 static void world_derive(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                          const plr_view *view, const plr_real Dz[9], const plr_real along[3],
                          plr_real z[3], plr_rows *H) {
+    PLR_ASSERT(slot < belief->count);
     plr_real DzR[9], S[9], DzRS[9];
     (void)along, (void)z;
     plr_mat3_mul(DzR, Dz, camera->given.R_CB);

@@ -5,6 +5,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 
@@ -13,7 +14,6 @@ void plr_motion_clear(const plr_belief *belief, plr_motion *motion) {
     if (!plr_has_block(belief, PLR_BLOCK_VELOCITY))
         return;
     const unsigned own = plr_row_of(belief, PLR_BLOCK_VELOCITY) - belief->layout.driver;
-    memset(&motion->core, 0, sizeof motion->core);
     for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
         motion->core.V[PLR_DRIVERS * i + own + i] = 1;
 }
@@ -92,6 +92,7 @@ static void fill_prior(const plr_belief *belief, const plr_motion *motion, plr_n
 
 void plr_motion_prior(const plr_belief *belief, const plr_motion *motion, plr_noise *noise,
                       plr_real weight, plr_applied_motion *applied) {
+    PLR_ASSERT(weight >= PLR_R(1));
     fill_prior(belief, motion, noise, applied, weight * weight, 0, 0);
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 /* The motion since landmarks and covariance were last moved. The pose contains it already;
- * f->motion accumulates it until a frame applies it to them (docs/MATH.md 4 and 6). */
+ * plr_motion accumulates it until a frame applies it to them (docs/MATH.md 4 and 6). */
 #ifndef PLR_STATE_MOTION_H
 #define PLR_STATE_MOTION_H
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/workspace.h"
 
 /* Nothing accumulated: D = I, Q = 0, B = 0; velocity and biases as they are. */
 void plr_motion_clear(const plr_belief *belief, plr_motion *motion);

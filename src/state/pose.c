@@ -4,6 +4,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 #include "state/rigid_fit.h"
 
 /* Not made orthonormal, R would deviate from a rotation by 0.01 in an hour of float32 steps. */
@@ -24,6 +25,7 @@ bool plr_pose_is_correction(const plr_real xi[PLR_POSE_DIM]) {
 }
 
 void plr_pose_correct(plr_belief *belief, const plr_real xi[PLR_POSE_DIM]) {
+    PLR_ASSERT(plr_pose_is_correction(xi));
     plr_real E[9], p[3];
     plr_se3_expm1(E, p, xi);
     plr_pose_move(belief, E, p);

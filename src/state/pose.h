@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
 
 /* T <- T (I + E, d): p <- p + R d in double, and R is made orthonormal. */
 void plr_pose_move(plr_belief *belief, const plr_real E[9], const plr_real d[3]);

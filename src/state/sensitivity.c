@@ -6,12 +6,14 @@
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/calibration.h"
 
 /* ---------------------------------------------------------------- as P changes */
 
 void plr_sensitivity_clear(plr_belief *belief, unsigned row, unsigned rows) {
+    PLR_ASSERT(row + rows <= PLR_MAX_LD && belief->layout.errors <= PLR_CALIBRATIONS);
     for (unsigned k = 0; k < belief->layout.errors; k++)
         memset(belief->S[k] + row, 0, rows * sizeof *belief->S[k]);
 }
@@ -30,6 +32,7 @@ void plr_sensitivity_append(plr_belief *belief, unsigned row, const plr_new_land
 }
 
 void plr_sensitivity_remove(plr_belief *belief, unsigned to, unsigned from) {
+    PLR_ASSERT(to <= from);
     for (unsigned k = 0; k < belief->layout.errors; k++)
         memcpy(belief->S[k] + to, belief->S[k] + from, PLR_LANDMARK_DIM * sizeof *belief->S[k]);
 }
@@ -54,6 +57,8 @@ void plr_sensitivity_turn_landmarks(plr_belief *belief, const plr_real *F) {
 
 void plr_sensitivity_move_range(plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                                 plr_real ratio) {
+    PLR_ASSERT(slot < belief->count);
+    PLR_ASSERT(camera->errors.count == belief->layout.errors);
     for (unsigned k = 0; k < belief->layout.errors; k++) {
         const unsigned kind = camera->errors.kind[k];
         const bool is_way = kind >= PLR_CAMERA_PLACE_X; /* it moves a point by its inverse range */
@@ -69,6 +74,7 @@ void plr_sensitivity_move_range(plr_belief *belief, const plr_camera_model *came
 /* out = X S_d, rows x drivers, PLR_DRIVERS between the rows of X. */
 static void by_drivers(const plr_belief *belief, unsigned parameter, unsigned rows,
                        const plr_real *X, plr_real *out) {
+    PLR_ASSERT(parameter < belief->layout.errors);
     const plr_real *S_d = belief->S[parameter] + belief->layout.driver;
     for (unsigned r = 0; r < rows; r++, X += PLR_DRIVERS) {
         out[r] = 0;
@@ -79,6 +85,7 @@ static void by_drivers(const plr_belief *belief, unsigned parameter, unsigned ro
 
 static void set_velocity(plr_belief *belief, unsigned parameter,
                          const plr_real v[PLR_VELOCITY_DIM]) {
+    PLR_ASSERT(plr_has_block(belief, PLR_BLOCK_VELOCITY));
     memcpy(belief->S[parameter] + plr_row_of(belief, PLR_BLOCK_VELOCITY), v,
            PLR_VELOCITY_DIM * sizeof *v);
 }
@@ -86,6 +93,7 @@ static void set_velocity(plr_belief *belief, unsigned parameter,
 /* S_k += sum over r of a_r X_r, X 6 x dim */
 static void combine(plr_belief *belief, unsigned parameter, const plr_real a[PLR_POSE_DIM],
                     const plr_real *X, size_t ld) {
+    PLR_ASSERT(parameter < belief->layout.errors);
     plr_combine_rows(plr_covariance_dim(belief), PLR_POSE_DIM, a, 1, X, ld, belief->S[parameter]);
 }
 
@@ -133,6 +141,7 @@ typedef plr_real plr_by_error[PLR_CALIBRATIONS][PLR_POSE_DIM];
 
 /* C (n x n) += y Sigma y^T, Sigma = G D G^T the covariance of the errors. */
 static void add_told(const plr_camera_model *camera, unsigned n, plr_by_error y, plr_real *C) {
+    PLR_ASSERT(n <= PLR_POSE_DIM && camera->errors.estimated <= camera->errors.count);
     const plr_error_columns *errors = &camera->errors;
     for (unsigned k = 0; k < errors->count; k++) {
         const plr_real *G = camera->estimate.factor + PLR_CALIBRATIONS * k;
@@ -150,6 +159,7 @@ static void add_told(const plr_camera_model *camera, unsigned n, plr_by_error y,
 
 void plr_sensitivity_add_to(const plr_belief *belief, const plr_camera_model *camera, unsigned row,
                             unsigned rows, plr_real *C) {
+    PLR_ASSERT(rows <= PLR_POSE_DIM && camera->errors.count == belief->layout.errors);
     plr_by_error y;
     for (unsigned k = 0; k < belief->layout.errors; k++)
         memcpy(y[k], belief->S[k] + row, rows * sizeof **y);

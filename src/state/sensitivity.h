@@ -17,7 +17,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/camera.h"
+#include "pelorus/workspace.h"
 #include "state/model.h"
 
 /* ---------------------------------------------------------------- as P changes */

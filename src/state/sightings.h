@@ -6,7 +6,8 @@
 #include <stdbool.h>
 
 #include "pelorus/assertions.h"
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/workspace.h"
 #include "state/slots.h"
 
 /* True if the state holds the landmark that is seen. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "math/finite.h"
+#include "pelorus/assertions.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/sensitivity.h"
@@ -59,6 +60,7 @@ bool plr_slots_make_room(plr_belief *belief, const plr_camera_model *camera,
 
 void plr_slots_append(plr_belief *belief, uint32_t id, bool known,
                       const plr_new_landmark *landmark) {
+    PLR_ASSERT(belief->count < belief->capacity && plr_slots_find(belief, id) == PLR_NO_SLOT);
     plr_covariance_append(belief, landmark);
     plr_slot *slot = &belief->slots[belief->count++];
     memset(slot, 0, sizeof *slot);
@@ -71,6 +73,7 @@ void plr_slots_append(plr_belief *belief, uint32_t id, bool known,
 }
 
 void plr_slots_remove(plr_belief *belief, unsigned slot) {
+    PLR_ASSERT(slot < belief->count);
     plr_covariance_remove(belief, slot);
     belief->count--;
     if (slot < belief->count)
@@ -79,6 +82,7 @@ void plr_slots_remove(plr_belief *belief, unsigned slot) {
 
 bool plr_slots_export(const plr_belief *belief, const plr_camera_model *camera,
                       const plr_motion *motion, unsigned slot, plr_landmark *landmark) {
+    PLR_ASSERT(slot < belief->count);
     const plr_slot *s = &belief->slots[slot];
     plr_world_point point;
     plr_real P[9];

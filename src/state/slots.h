@@ -6,7 +6,9 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/camera.h"
+#include "pelorus/map.h"
 #include "state/model.h"
 
 /* No slot. */

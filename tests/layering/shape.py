@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Holds the sources against the rules of shape: how long a file and a function may be, who may
-touch the covariance, who may see the whole filter, and where the dimensions and the setting `bias` may be known.
+touch the covariance, who may see the whole filter, and where the dimensions and the setting `bias`
+may be known.
 
 usage: shape.py PROJECT_ROOT
 
@@ -24,7 +25,16 @@ FOLDERS = ("include", "src", "port", "tests", "tools")
 # Rooms that know the state by its blocks.
 ROOMS = ("state", "process", "sensor", "filter")
 # Rooms whose functions take what they touch, and never the whole filter.
-ROOMS_WITH_PARTS = ("math", "record", "state", "process", "sensor", "supervise", "known_map", "absent")
+ROOMS_WITH_PARTS = (
+    "math",
+    "record",
+    "state",
+    "process",
+    "sensor",
+    "supervise",
+    "known_map",
+    "absent",
+)
 
 # The first line of a function's body in C as clang-format writes it: `{` ends a line that began, or
 # whose head began, in the first column. What else opens a brace there holds no statements.
@@ -111,12 +121,16 @@ def check_covariance(root: Path) -> Iterator[Breach]:
 
 
 def check_parts(root: Path) -> Iterator[Breach]:
-    """A function takes the structs that it touches: only src/filter and the public calls see plr_filter."""
+    """A function takes the structs that it touches: src/filter and the public calls alone see the
+    whole filter.
+    """
     for room in ROOMS_WITH_PARTS:
         for path in sorted((root / "src" / room).rglob("*.[ch]")):
             for number, line in code_lines(path):
                 if WHOLE_FILTER.search(line):
-                    yield Breach(path, number, "the whole filter: take the structs that are touched")
+                    yield Breach(
+                        path, number, "the whole filter: take the structs that are touched"
+                    )
 
 
 def check_dimensions(root: Path) -> Iterator[Breach]:

@@ -159,7 +159,7 @@ def plr_03(of_03: Converted, once: Once) -> Path:
 @pytest.fixture
 def pelorus(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
     def run(*arguments: object, status: int | None = 0) -> Said:
-        """`status` is due; None: any."""
+        """`status` is expected; None: any."""
         capsys.readouterr()
         got = main([str(argument) for argument in arguments])
         captured = capsys.readouterr()
@@ -194,5 +194,5 @@ def compare(pelorus: Callable[..., Said], tmp_path: Path) -> Compare:
 
 @pytest.fixture
 def log(tmp_path: Path) -> list[Message]:
-    """Of a robot with settings of its own."""
+    """Returns the log of a robot with settings of its own."""
     return robots_log(tmp_path, drive(), "--slots", "20", "--bias", "on")

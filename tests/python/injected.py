@@ -287,7 +287,7 @@ def found_in(recording: Recording) -> list[Fault]:
 
 
 def injections(recording: Recording) -> Iterator[tuple[str, int, Recording, tuple[str, ...]]]:
-    """Fault, strength, the recording that has it, what is due."""
+    """Fault, strength, the recording that has it, what is expected."""
     by_imu = len(recording.inertial.t_ns) > 0
     for name, (change, due) in (OF_IMU if by_imu else OF_RECORDINGS).items():
         for k in range(1 if name in ALIKE else 3):
@@ -330,7 +330,7 @@ def clean_pieces(name: str, whole: Recording) -> tuple[int, int]:
 
 
 def injected(name: str, recording: Recording) -> tuple[int, int, int]:
-    """Of so many faults so many are named rightly, and so many others cannot be told."""
+    """Returns how many faults were named right, of how many, and how many cannot be named."""
     right, asked, beyond = 0, 0, 0
     known = Known.of(first_part(recording))
     own = {fault.name for fault in found_in(recording)}

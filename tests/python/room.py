@@ -35,11 +35,12 @@ class Room:
     """A drive through it."""
 
     cameras: Cameras
+    drive_s: float = DRIVE_S
 
     def write(self, top: Path) -> Path:
         chance = np.random.default_rng(1)
         shades = [texture(seed) for seed in range(6)]
-        for t in np.arange(0.1, DRIVE_S - 0.1, 1 / RATE_HZ):
+        for t in np.arange(0.1, self.drive_s - 0.1, 1 / RATE_HZ):
             R, p = body(np.array([t]))
             T_WL = se3.compose(Poses(R[0], p[0]), se3.inverse(self.cameras.T_LB))
             T_WR = se3.compose(T_WL, se3.inverse(self.cameras.T_RL))
@@ -49,7 +50,7 @@ class Room:
                 noisy = seen + chance.normal(0, SHADE_SIGMA, seen.shape)
                 picture = np.clip(noisy, 0, 255).astype(np.uint8)
                 write_picture(top / "mav0" / f"cam{k}" / "data" / f"{_ns(t)}.png", picture)
-        t = np.arange(int(DRIVE_S * IMU_HZ) + 1) / IMU_HZ
+        t = np.arange(int(self.drive_s * IMU_HZ) + 1) / IMU_HZ
         _write_rows(top / "mav0" / "imu0", t, _imu(t, chance))
         R, p = body(t)
         x, y, z, w = Rotation.from_matrix(R).as_quat().T

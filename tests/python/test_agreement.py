@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import OF_RECORDINGS
@@ -17,10 +18,10 @@ from pelorus.faults.agreement import Agreement, agreement
 from pelorus.faults.amounts import of_clock, of_lever, of_scale
 from pelorus.faults.clocks import TwoClocks
 from pelorus.faults.fault import Fault
-from pelorus.faults.mounting import Rates
+from pelorus.faults.mounting import MotionPairs
 from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.recording import Recording
 from pelorus.second_view import NOISE, inverse
@@ -115,7 +116,7 @@ def test_a_clock_is_found_to_some_milliseconds(late_s: float) -> None:
     assert found.offset_sigma_s < 0.008
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", draws([1, 2, 3]))
 def test_a_clock_is_known_no_better_than_noisy_twists_tell_it(seed: int) -> None:
     """As 0027 has them: between two readings a mean of both is taken, whose noise is smaller, and
     half a reading early or late looked like the right offset, known to some milliseconds.
@@ -167,7 +168,7 @@ def circled(seed: int) -> Recording:
     )
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", draws(range(8)))
 def test_where_nothing_varies_no_clock_is_told_and_no_scale_of_turns(seed: int) -> None:
     """A weak instrument found 0.011 +- 0.046 times the turns, and frames 242 +- 30 ms late."""
     recording = circled(seed)
@@ -265,7 +266,7 @@ def test_a_wrong_lever_is_not_told_as_a_turned_extrinsic(off: str) -> None:
     wrong = T._replace(p=-right if off == "the sign" else -T.R.T @ right)
     asked = []
 
-    def counted(recording: Recording, views: TwoViews, seen: Seen) -> Agreement:
+    def counted(recording: Recording, views: TwoViews, seen: CameraMotion) -> Agreement:
         asked.append(1)
         return agreement(recording, views, seen)
 
@@ -276,7 +277,7 @@ def test_a_wrong_lever_is_not_told_as_a_turned_extrinsic(off: str) -> None:
     assert len(asked) == 1
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", draws([1, 2, 3]))
 def test_a_gyros_noise_moves_no_lever(seed: int) -> None:
     """What turns with a noisy gyro seemed to turn less, as if the camera sat nearer to the body."""
     noisy = replace(DRIVE, seed=seed, duration_s=40.0, twist_rate_hz=10.0, gyro_sigma_radps=0.1)
@@ -317,7 +318,7 @@ def test_where_velocities_tell_no_clock_it_may_be_the_gyros(
     assert ("or the rates of turn alone" in clock.words) == said
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", draws(range(5)))
 def test_axes_that_hardly_turn_are_told_from_mirrored_ones(seed: int) -> None:
     """As of a car on a road, in ten seconds. What is far from the given axes and nearer to the
     others was not named unless it was far from the middle of both, too.
@@ -329,8 +330,8 @@ def test_axes_that_hardly_turn_are_told_from_mirrored_ones(seed: int) -> None:
     w = np.stack([np.convolve(chance.normal(0, x, 130), smooth, "valid") for x in spread], axis=1)
     seen = w + chance.normal(0, 0.005, w.shape)
     told = w + chance.normal(0, 0.005, w.shape)
-    assert not Rates(seen, told).alone().won
-    mirrored = Rates(seen, told * [-1, -1, 1]).alone()
+    assert not MotionPairs(seen, told).alone().won
+    mirrored = MotionPairs(seen, told * [-1, -1, 1]).alone()
     assert mirrored.won
     assert np.array_equal(np.diag(mirrored.F), [-1, -1, 1])
 
@@ -363,7 +364,7 @@ def test_a_point_of_unknown_depth_has_no_negative_d2(size: float) -> None:
         assert np.allclose(np.einsum("ijn,jkn->nik", W, S), np.eye(3), atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", [9429, 9618, 9411])
+@pytest.mark.parametrize("seed", draws([9429, 9618, 9411]))
 def test_at_an_even_speed_a_scale_is_known_as_well_as_a_bias(seed: int) -> None:
     """0.107 +- 0.183, 0.043 +- 0.038 and 1.136 +- 0.205 times the way were told: a weak instrument
     takes the scale to zero, or anywhere.

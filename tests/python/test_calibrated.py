@@ -60,7 +60,8 @@ def _spoil(out: Path, folder: Path) -> None:
 
 
 def replayed(recording: Path, log: Path, *options: str) -> str:
-    command = [str(REPLAY), str(recording), *SIGMAS, *options, "--out", str(log)]
+    command = [str(REPLAY), str(recording), *SIGMAS, *options, "--force"]
+    command += ["--out", str(log)]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 

@@ -10,17 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from draws import draws
 from drives import at_rest, clean, with_stale_tracks
 from imu_drives import NOISY, noisy, options
 from numpy.typing import NDArray
 from pelorus.converters import full_scale, repeated
-from pelorus.converters.streams import Readings, Seen, Streams, Twists, _moves, recording
+from pelorus.converters.streams import RawTracks, Readings, Streams, Twists, _moves, recording
 from pelorus.faults import platform, resolution, sync
 from pelorus.faults.geometry import WORLD_SURE, _at_times, _in_world
 from pelorus.faults.imu_axes import _units
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.named import _beside_way, _pixels, _times
-from pelorus.faults.seen import Seen as SeenMotion
+from pelorus.faults.seen import CameraMotion as SeenMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import two_views
 from pelorus.faults.world_axes import world_axes
@@ -62,7 +63,7 @@ def test_cameras_that_run_free_are_told_by_how_much(by_ms: float) -> None:
     assert "Trigger both cameras together" in found.fault.words
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", draws(range(4)))
 def test_cameras_that_are_triggered_together_are_not_accused(seed: int) -> None:
     for drive in (noisy(seed).recording, clean(seed=seed)):
         found = sync.apart(drive)
@@ -111,7 +112,7 @@ def test_tracks_of_one_part_of_the_picture_are_no_other_resolution() -> None:
 
 
 def streams(drive: Recording) -> Streams:
-    frames = Seen(Path("stereo.csv"), drive.frame_t_ns, drive.tracks)
+    frames = RawTracks(Path("stereo.csv"), drive.frame_t_ns, drive.tracks)
     motion: Twists | Readings = Readings(Path("imu.csv"), drive.inertial)
     if not len(drive.inertial.t_ns):
         motion = Twists(Path("odom.csv"), drive.twist_t_ns, drive.v_B_mps, drive.w_B_radps)

@@ -35,6 +35,7 @@ SUBCOMMANDS = [
     ("map",),
     ("course",),
     ("convert", "map"),
+    ("live",),
     ("stream",),
     ("compare",),
 ]

@@ -25,7 +25,7 @@ SIGMA_M = 0.05
 
 
 def positions(folder: Path, drive: Recording, every: int) -> Path:
-    """Of the body's origin, with noise."""
+    """Writes positions of the body's origin, with noise."""
     t_ns, p = drive.truth_t_ns[every::every], drive.truth.p[every::every]
     p = p + np.random.default_rng(6).normal(0, SIGMA_M, p.shape)
     columns = dict(zip(("px_m", "py_m", "pz_m"), p.T.tolist(), strict=True))
@@ -93,14 +93,14 @@ def test_what_lacks_is_told(tmp_path: Path, pelorus: Run) -> None:
     rows = {"t_ns": drive.twist_t_ns.tolist(), "vx": drive.v_B_mps[:, 0].tolist()}
     motion = ("--twists", write_csv(twists, rows), "--measured", "vx")
     assert (
-        "--stereo FILE or --position FILE is due"
+        "--stereo FILE or --position FILE is expected"
         in pelorus("convert", "csv", *motion, target, status=1).err
     )
     stereo = write_csv(tmp_path / "stereo.csv", {"t_ns": [1], "id": [1]})
     said = pelorus("convert", "csv", *motion, "--stereo", stereo, target, status=1).err
-    assert "stereo.csv: of which cameras? --calibration FILE is due" in said
+    assert "stereo.csv: of which cameras? --calibration FILE is expected" in said
     odd = write_yaml(tmp_path / "odd.yaml", {"rate_hz": 3})
     where = ("--position", positions(tmp_path, drive, 5), "--calibration", odd)
     said = pelorus("convert", "csv", *motion, *where, target, status=1).err
-    assert "odd.yaml: is no IMU's file, or a second one; one is due" in said
+    assert "odd.yaml: is no IMU's file, or a second one; one is expected" in said
     assert not target.exists()

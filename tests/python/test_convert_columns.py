@@ -24,7 +24,7 @@ TODAY_NS = 1_763_822_000_123_456_789  # a double has no such nanoseconds
 
 
 def options_of(folder: Path, drive: Recording, *without: str) -> list[Any]:
-    """Of `convert csv`, without some of the files."""
+    """Returns the options of `convert csv`, without some of the files."""
     words = csv_files(folder, drive)
     pairs = zip(words[::2], words[1::2], strict=True)
     return [word for name, path in pairs if name not in without for word in (name, path)]
@@ -130,7 +130,7 @@ def test_a_wheel_and_a_gyro_in_files_of_their_own_make_twists_that_turn_as_the_g
 def test_an_imu_in_g_or_without_gravity_is_refused(tmp_path: Path, pelorus: Run) -> None:
     options = options_of(tmp_path, clean(**SHORT), "--twists")
     for up, said in (
-        (1.0, "is 1 m/s^2 in the median; about 9.81 is due: is it in g"),
+        (1.0, "is 1 m/s^2 in the median; about 9.81 is expected: is it in g"),
         (0.0, "is 0"),
     ):
         names = ("ax_mps2", "ay_mps2", "wx_radps", "wy_radps", "wz_radps")
@@ -222,17 +222,26 @@ def test_times_of_another_unit_are_named(size: float, unit: str) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--columns", "v=vx_mps,q=x"), "--columns q=x: NAME=COLUMN is due, such as v=speed_mps"),
-        (("--columns", "v"), "--columns v: NAME=COLUMN is due"),
-        (("--columns", "v=pace"), "in which unit is pace? v=pace:UNIT is due, with mps or m/s or"),
+        (
+            ("--columns", "v=vx_mps,q=x"),
+            "--columns q=x: NAME=COLUMN is expected, such as v=speed_mps",
+        ),
+        (("--columns", "v"), "--columns v: NAME=COLUMN is expected"),
+        (
+            ("--columns", "v=pace"),
+            "in which unit is pace? v=pace:UNIT is expected, with mps or m/s or",
+        ),
         (
             ("--columns", "t=stamp:min"),
-            "min is no unit of t: t=stamp:UNIT is due, with ns or us or",
+            "min is no unit of t: t=stamp:UNIT is expected, with ns or us or",
         ),
         (("--columns", "v=pace_mps"), "no file has the column pace_mps; there are: "),
         (("--columns", "vy=vx_mps"), "has the column vy_mps, and vx_mps is to be called so"),
-        (("--measured", "vx,yaw"), "--measured vx,yaw: some of vx, vy, vz, wx, wy, wz are due"),
-        (("--imu", "imu.csv"), "--twists and --imu given; one is due"),
+        (
+            ("--measured", "vx,yaw"),
+            "--measured vx,yaw: some of vx, vy, vz, wx, wy, wz are expected",
+        ),
+        (("--imu", "imu.csv"), "--twists and --imu given; one is expected"),
     ],
 )
 def test_options_that_make_no_sense_are_refused_with_what_would_be_right(
@@ -297,10 +306,10 @@ def test_semicolons_with_decimal_commas_and_zero_bytes_are_told(
     whole = path.read_text()
     path.write_text(whole.replace(",", ";").replace(".", ","))
     outcome = pelorus("convert", "csv", *files, tmp_path / "out.plr", status=1)
-    assert "points in numbers, and commas between them, are due" in outcome.err
+    assert "points in numbers, and commas between them, are expected" in outcome.err
     path.write_bytes(whole.encode("utf-16-le"))
     outcome = pelorus("convert", "csv", *files, tmp_path / "out.plr", status=1)
-    assert "byte 1: is no text; text in UTF-8 is due" in outcome.err
+    assert "byte 1: is no text; text in UTF-8 is expected" in outcome.err
 
 
 def test_files_with_plain_names_and_a_few_bad_rows_are_converted_and_that_is_said(
@@ -341,7 +350,7 @@ def test_the_name_that_the_project_asks_for_names_its_unit(tmp_path: Path, pelor
     for wrong in ("vx_kg=vx", "mps=vx"):
         again = (*files, tmp_path / "no.plr", "--columns", wrong)
         said = pelorus("convert", "csv", *again, status=1).err
-        assert f"--columns {wrong}: NAME=COLUMN is due" in said
+        assert f"--columns {wrong}: NAME=COLUMN is expected" in said
 
 
 def test_a_complaint_calls_a_column_as_its_file_does(tmp_path: Path, pelorus: Run) -> None:
@@ -363,7 +372,7 @@ def test_a_complaint_calls_a_column_as_its_file_does(tmp_path: Path, pelorus: Ru
 
     named = "v=speed_kmh,wx=roll_rate_dps"
     said = complaint(f"{named},twists.t=stamp_ms", "fast")
-    assert "row 2: roll_rate_dps is 'fast', a number is due" in said
+    assert "row 2: roll_rate_dps is 'fast', a number is expected" in said
     typed = complaint(f"{named},twists.t=stmp_ms", "0")
     assert "lacks the column stmp_ms; there are: stamp_ms, speed_kmh, roll_rate_dps" in typed
 

@@ -82,7 +82,7 @@ def refusal_of_twists(folder: Path, pelorus: Run, change: tuple[str, str]) -> st
 
 
 def sources_in(folder: Path) -> csv_converter.Sources:
-    """Of the files that `csv_files` wrote."""
+    """Returns the files that `csv_files` wrote."""
     return csv_converter.Sources(
         csv_converter.MotionFiles(folder / "twists.csv"),
         folder / "stereo.csv",
@@ -187,7 +187,7 @@ BAD_CSV = [
     (edited("camera.json", '"pixel_sigma_px": 0.5', '"pixel_sigma_px": NaN'), "names with numbers"),
     (edited("camera.json", '"twist_timing": "end"', '"twist_timing": ["end"]'), "start or end"),
     (edited("camera.json", '"name": ', '"fx_px": 1, "name": '), "'fx_px' twice"),
-    (edited("camera.json", '"name": "mine"', '"name": ["mine"]'), "words are due"),
+    (edited("camera.json", '"name": "mine"', '"name": ["mine"]'), "words are expected"),
     (edited("camera.json", '"name": "mine"', r'"name": "\ud800"'), "half of a surrogate pair"),
 ]
 

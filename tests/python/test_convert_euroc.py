@@ -60,6 +60,11 @@ def imu_times() -> list[int]:
     return [BEGIN_NS - 10**8 + k * 10**9 // IMU_HZ for k in range(IMU_HZ)]
 
 
+# A filter starts from the truth's first pose: the readings before it are left out.
+TRUTH_BEGINS_NS = BEGIN_NS - 3 * 10**7
+EARLY = sum(t < TRUTH_BEGINS_NS for t in imu_times())
+
+
 def write_imu(folder: Path, T_BI: Poses) -> None:
     folder.mkdir(parents=True)
     lines = [f"{t},0.1,0.2,{k},4.0,5.0,9.5\n" for k, t in enumerate(imu_times())]
@@ -69,7 +74,7 @@ def write_imu(folder: Path, T_BI: Poses) -> None:
 
 
 def write_truth(folder: Path, T_BI: Poses) -> None:
-    """Of the folder's body, between the frames: 30 ms before and behind each."""
+    """Writes poses of the folder's body between the frames: 30 ms before and after each."""
     folder.mkdir(parents=True)
     of_imu = Scene().body()
     T_IB = se3.inverse(T_BI)
@@ -126,8 +131,8 @@ def test_a_folder_of_pictures_arrives_as_tracks_of_a_rectified_pair_with_imu_and
     a = np.concatenate([m.a_B_mps2 for m in imu])
     w = np.concatenate([m.w_B_radps for m in imu])
     assert np.allclose(a, [4.0, 5.0, 9.5])
-    assert np.allclose(w[:, 2], np.arange(IMU_HZ))
-    assert imu[0].t_ns == imu_times()[0]
+    assert np.allclose(w[:, 2], np.arange(EARLY, IMU_HZ))
+    assert imu[0].t_ns == TRUTH_BEGINS_NS
     assert_on_surfaces(target)
 
 
@@ -198,19 +203,22 @@ def _later(path: Path) -> None:
     [
         (lambda p: shutil.rmtree(p / "mav0/cam1"), "has no folders cam0 and cam1, nor mav0"),
         (lambda p: (p / "mav0/cam1/sensor.yaml").unlink(), "cam1/sensor.yaml: there is no such"),
-        (lambda p: (p / "mav0/imu0/data.csv").unlink(), "--twists FILE, or --imu FILE is due"),
+        (lambda p: (p / "mav0/imu0/data.csv").unlink(), "--twists FILE, or --imu FILE is expected"),
         (
             lambda p: (p / f"mav0/cam0/data/{BEGIN_NS}.png").unlink(),
             f"1 are not there or cut off, {{folder}}/mav0/cam0/data/{BEGIN_NS}.png first",
         ),
-        (lambda p: (p / "mav0/cam0/data.csv").write_text("a,b\n"), "a time in ns, a file are due"),
+        (
+            lambda p: (p / "mav0/cam0/data.csv").write_text("a,b\n"),
+            "a time in ns, a file are expected",
+        ),
         (
             lambda p: (p / "mav0/cam0/data.csv").write_text("7,7.png\n"),
             "0 pairs, taken within 2 ms; 6 pictures have no partner, 1 are not there or cut off",
         ),
         (lambda p: (p / "mav0/imu0/data.csv").write_text("1,2,3\n"), "has 3 numbers; 7 a row are"),
         (lambda p: (p / "mav0/imu0/data.csv").write_bytes(b""), "imu0/data.csv: the file is empty"),
-        (_small, f"188 x 120 pixels; {WIDTH} x {HEIGHT} are due, for which the calibration"),
+        (_small, f"188 x 120 pixels; {WIDTH} x {HEIGHT} are expected, for which the calibration"),
         (_later, "they do not overlap"),
     ],
 )
@@ -321,9 +329,10 @@ def test_readings_and_poses_that_are_none_are_left_out_if_they_are_few(
     _edit(truth, lambda rows: [rows[0], rows[1].replace(",0.03,", ",NaN,"), *rows[2:]])
     target = tmp_path / "out.plr"
     said = pelorus("convert", "euroc", folder, target).out
-    assert sum(len(m.a_B_mps2) for m in messages_of(target, Imu)) == IMU_HZ - 1
+    assert sum(len(m.a_B_mps2) for m in messages_of(target, Imu)) == IMU_HZ - 1 - EARLY
     for words in (
-        "imu0/data.csv: 1 of 203 rows are left out, line 204 first: has 3 numbers; 7 a row are due",
+        "imu0/data.csv: 1 of 203 rows are left out, line 204 first: has 3 numbers; 7 a row "
+        "are expected",
         "imu0/data.csv: 1 of 202 rows are left out, line 23 first: holds a number that is not fin",
         "imu0/data.csv: 1 of 201 rows are left out, line 2 first: its time is 0: it was never set",
         "imu0/data.csv: 1 of 201 rows are left out, line 25 first: time does not ascend but rep",

@@ -223,7 +223,7 @@ BAD = [
     ({"calib": {"fx": -1}}, "must be positive"),
     ({"calib": {"T_imu_cam0": [1, 2]}}, "calib: T_imu_cam0 is [1, 2]; 4 x 4 finite numbers"),
     ({"calib": {"T_imu_cam0": np.zeros((4, 4)).tolist()}}, "T_imu_cam0 is no rotation"),
-    ({"calib": {"baseline_m": 0.5}}, "that of a rectified pair is due, baseline_m = 0.5"),
+    ({"calib": {"baseline_m": 0.5}}, "that of a rectified pair is expected, baseline_m = 0.5"),
     ({"calib": {"gravity_world": [0, 9.81, 0]}}, "z of the world is up"),
     ({"calib": {"gyro_noise_density": 0}}, "gyro_noise_density is 0; a positive number"),
     ({"calib": {"cam_imu_time_offset_s": 0.01}}, "cam_imu_time_offset_s is 0.01"),

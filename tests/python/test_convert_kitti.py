@@ -222,7 +222,11 @@ def test_own_twists_take_the_place_of_made_ones(
         ("calib_cam_to_cam.txt", "P_rect_00: 1 2\n", "P_rect_00 has 2 numbers; 12 finite ones are"),
         ("calib_velo_to_cam.txt", "R: a\n", "R holds something that is no number"),
         ("calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 2\nT: 1 2 3\n", "R is no rotation"),
-        ("{}/oxts/timestamps.txt", stamps(3), "has 3 times; 6 are due, one for each file in data"),
+        (
+            "{}/oxts/timestamps.txt",
+            stamps(3),
+            "has 3 times; 6 are expected, one for each file in data",
+        ),
         ("{}/oxts/timestamps.txt", "soon\n" * 6, "line 1: 'soon' is no time; 2011-09-30 12:40:25"),
         ("{}/image_00/timestamps.txt", stamps(1) * 6, "line 2: time does not ascend"),
         ("{}/oxts/data/0000000002.txt", "1 2 3\n", "line 1: has 3 numbers; 30 a row are"),

@@ -59,7 +59,7 @@ def test_starry_night_brings_its_landmarks_and_its_noise(tmp_path: Path, pelorus
 
 
 BAD_MAT = [
-    ({"y_k_j": np.zeros((4, 8, 9))}, "4 x 61 x n or 4 x n x 61 is due"),
+    ({"y_k_j": np.zeros((4, 8, 9))}, "4 x 61 x n or 4 x n x 61 is expected"),
     ({"y_k_j": np.zeros((4, COUNT, COUNT))}, "which axis is time"),
     ({"y_k_j": np.zeros((5, COUNT, 9))}, "shape"),
     ({"v_vk_vk_i": np.zeros((3, 5))}, "5 columns for 61 times"),
@@ -84,7 +84,7 @@ def test_a_misshapen_mat_is_refused(
 def test_a_folder_in_place_of_the_file_is_called_so(tmp_path: Path, pelorus: Run) -> None:
     for source in ("klt", "starry-night", "imu-npz", "ece276a"):
         said = pelorus("convert", source, tmp_path, tmp_path / "out.plr", status=1).err
-        assert "is a folder; one file of it is due" in said
+        assert "is a folder; one file of it is expected" in said
 
 
 def test_starry_night_without_landmarks_is_refused(tmp_path: Path, pelorus: Run) -> None:

@@ -427,8 +427,9 @@ def test_headers_without_a_time_are_told_and_the_arrival_taken_instead(
         recorder.found.append((topic, kind, t_ns, message))
     bag, target = written(recorder, tmp_path, "mcap"), tmp_path / "out.plr"
     outcome = pelorus("convert", "ros", bag, target, "--calibration", kalibr, status=1)
-    assert "/twist: 6 of 6 headers have no time; times in header.stamp are due, or --stamps" in (
-        outcome.err
+    assert (
+        "/twist: 6 of 6 headers have no time; times in header.stamp are expected, or --stamps"
+        in (outcome.err)
     )
     words = ("--calibration", kalibr, "--stamps", "log", "--fix", "none")
     pelorus("convert", "ros", bag, target, *words)

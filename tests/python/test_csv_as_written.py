@@ -52,7 +52,7 @@ def test_names_of_EuRoC_have_their_units_in_brackets(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "cell", "due"),
-    [("t_ms", "1_763", "a number is due"), ("t_ns", "1_763", "a whole number")],
+    [("t_ms", "1_763", "a number is expected"), ("t_ns", "1_763", "a whole number")],
 )
 def test_a_time_with_an_underscore_is_a_slip(
     tmp_path: Path, name: str, cell: str, due: str
@@ -65,7 +65,7 @@ def test_whole_numbers_may_have_a_point(tmp_path: Path) -> None:
     table = table_of(tmp_path, "id,x\n3.0,1\n4.,1\n5,1\n")
     assert table.integers("id", 9).tolist() == [3, 4, 5]
     for cell in ("3.5", "-3.0", ".0", "1e0", "3.0.0"):
-        with pytest.raises(ForeignFileError, match="a whole number from 0 to 9 is due"):
+        with pytest.raises(ForeignFileError, match="a whole number from 0 to 9 is expected"):
             table_of(tmp_path, f"id,x\n{cell},1\n").integers("id", 9)
 
 
@@ -119,7 +119,7 @@ def test_rows_without_numbers_are_left_out_if_they_are_few_and_others_keep_their
         "1 of 39 rows are left out, row 32 first: time does not ascend but repeats",
     ):
         assert f"twists.csv: {words}" in " ".join(remarks)
-    with pytest.raises(ForeignFileError, match="row 42: vx_mps is 'x', a number is due"):
+    with pytest.raises(ForeignFileError, match="row 42: vx_mps is 'x', a number is expected"):
         table.numbers("vx_mps")
     with pytest.raises(ForeignFileError, match=r"row 22: .*does not ascend"):
         table.ascending_times()

@@ -137,7 +137,7 @@ def test_how_a_file_was_read_is_told_where_its_columns_do_not_say_it(tmp_path: P
         ("nan nan nan nan nan nan nan", "holds a number that is not finite"),
         ("1.0 2.0 inf 0 0 0 1", "holds a number that is not finite"),
         ("1.0 2.0 3.0 0 0 0 0", "the quaternion's norm is not 1"),
-        ("1.0 2.0", "has 3 numbers; 8 a row are due"),
+        ("1.0 2.0", "has 3 numbers; 8 a row are expected"),
     ],
 )
 def test_poses_that_are_none_are_left_out_if_they_are_few(
@@ -178,7 +178,7 @@ def test_a_truth_with_names_of_its_own_is_read_by_convert_too(tmp_path: Path) ->
     [
         (T_NS // 1000, "truth.txt are 1e+03 times too small: are they in us or ms?"),
         (T_NS + 7_000_000, "most are within 0.007 s: --tolerance 0.0077 would take them"),
-        (T_NS + 10**12, "truth.txt (1650001000.400 to 1650001005.160 s); 3 are due\n"),
+        (T_NS + 10**12, "truth.txt (1650001000.400 to 1650001005.160 s); 3 are expected\n"),
     ],
 )
 def test_where_no_times_are_equal_what_would_help_is_told(
@@ -226,7 +226,9 @@ def test_a_truth_that_would_fit_otherwise_is_asked_about(
 ) -> None:
     mine, theirs = noisy(way()), wrong(way())
     mine.p[:, 0] += np.linspace(0, drift_m, COUNT)
-    found = misread.doubts(misread.Named("mine", mine), misread.Named("theirs", theirs), True)
+    found = misread.doubts(
+        misread.NamedPoses("mine", mine), misread.NamedPoses("theirs", theirs), True
+    )
     assert len(found) == 1
     assert asked in found[0]
 
@@ -257,4 +259,4 @@ def test_where_nothing_else_would_fit_nothing_is_asked(other: Callable[[Poses], 
     """Right; a little longer; of another drive; standing; too short; turned by 4 degrees."""
     theirs = other(way())
     mine = noisy(way()).at(slice(0, len(theirs.p)))
-    assert not misread.doubts(misread.Named("a", mine), misread.Named("b", theirs), False)
+    assert not misread.doubts(misread.NamedPoses("a", mine), misread.NamedPoses("b", theirs), False)

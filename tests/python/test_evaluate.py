@@ -284,7 +284,7 @@ def test_the_first_metres_are_left_out() -> None:
     [
         ("", "the file is empty"),
         ("# only a comment\n", "holds no row of numbers"),
-        ("1 2 3\n", "line 1: has 3 numbers; 8 are due"),
+        ("1 2 3\n", "line 1: has 3 numbers; 8 are expected"),
         ("0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n", "line 2: time does not ascend"),
         ("0 0 0 0 0 0 0 1\n1 0 0 x 0 0 0 1\n", "line 2: holds something that is no number"),
         ("0 0 0 nan 0 0 0 1\n", "line 1: holds a number that is not finite"),

@@ -68,7 +68,7 @@ def replayed(recording: Path, precision: Precision, *options: str) -> list[Messa
     """The log of it."""
     log = recording.with_name("log.plr")
     program = BIN / ("pelorus-replay" if precision == "float32" else "pelorus-replay-f64")
-    command = [str(program), str(recording), *options, "--out", str(log)]
+    command = [str(program), str(recording), *options, "--force", "--out", str(log)]
     subprocess.run(command, check=False, capture_output=True)  # its log says what it did
     return messages_of(log)
 

@@ -80,7 +80,11 @@ def test_an_npz_that_is_none_is_refused_with_what_would_be_right(
         ("cut.npz", archive[:-30], "is no .npz file, or its end is missing; a .npz file"),
         ("lone.npy", lone.getvalue(), "is a lone array (.npy); a .npz file"),
         ("lone.npz", lone.getvalue(), "is a lone array (.npy); a .npz file"),
-        ("locked.npz", encrypted(archive), "a.npy: is encrypted; a zip without a password is due"),
+        (
+            "locked.npz",
+            encrypted(archive),
+            "a.npy: is encrypted; a zip without a password is expected",
+        ),
         ("damaged.npz", bytes(damaged), "cannot be read as .npz: "),
     ):
         path = tmp_path / name
@@ -99,8 +103,8 @@ def test_an_archive_that_would_fill_the_memory_is_not_unpacked(
     np.savez_compressed(tmp_path / "bomb.npz", features=zeros)
     savemat(tmp_path / "bomb.mat", {"y_k_j": zeros}, do_compression=True)
     for name, form, said in (
-        ("bomb.npz", "ece276a", r"holds 80\d* bytes of arrays; at most 1000000 are due"),
-        ("bomb.mat", "klt", r"more than 1000000 bytes, which are due at most"),
+        ("bomb.npz", "ece276a", r"holds 80\d* bytes of arrays; at most 1000000 are expected"),
+        ("bomb.mat", "klt", r"more than 1000000 bytes, which are expected at most"),
     ):
         assert (tmp_path / name).stat().st_size < 100_000
         outcome = pelorus("convert", form, tmp_path / name, tmp_path / "out.plr", status=1)
@@ -179,7 +183,7 @@ def test_another_version_of_mat_is_told(tmp_path: Path) -> None:
     savemat(path, {"a": np.ones((20, 20))}, format="4")
     assert "not that of a MATLAB file of version 5 to 7" in refused(path, foreign.mat).wrong
     path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(384) + b"\x89HDF\r\n")
-    assert "save it with -v7" in refused(path, foreign.mat).due
+    assert "save it with -v7" in refused(path, foreign.mat).expected
 
 
 @pytest.mark.parametrize("read", [foreign.npz, foreign.mat])
@@ -198,7 +202,7 @@ def test_variances_that_are_none_are_refused(tmp_path: Path, pelorus: Run) -> No
     source = tmp_path / "starry.mat"
     savemat(source, arrays | {"y_var": -1.0, "v_var": 1.0, "w_var": 1.0})
     outcome = pelorus("convert", "starry-night", source, tmp_path / "out.plr", status=1)
-    assert "y_var is [-1.]; variances that are not negative are due" in outcome.err
+    assert "y_var is [-1.]; variances that are not negative are expected" in outcome.err
 
 
 # --- text -----------------------------------------------------------------------------------------
@@ -208,7 +212,7 @@ def test_a_text_beyond_the_limit_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "long.txt"
     path.write_text("0123456789")
     assert foreign.text(path, 10) == "0123456789"
-    assert "at most 9 bytes" in refused(path, lambda p: foreign.text(p, 9)).due
+    assert "at most 9 bytes" in refused(path, lambda p: foreign.text(p, 9)).expected
     endless = Path("/dev/zero")
     if endless.exists():
         assert "is too long" in refused(endless, lambda p: foreign.text(p, 1 << 22)).wrong
@@ -218,10 +222,10 @@ def test_a_byte_that_is_no_text_is_told_with_its_place(tmp_path: Path) -> None:
     path = tmp_path / "latin.csv"
     path.write_bytes("t_s,größe\n".encode("latin-1"))
     error = refused(path, foreign.csv_rows)
-    assert (error.at, error.wrong, error.due) == (
+    assert (error.at, error.wrong, error.expected) == (
         "byte 6",
         "is no text",
-        "text in UTF-8 is due",
+        "text in UTF-8 is expected",
     )
 
 

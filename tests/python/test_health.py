@@ -51,7 +51,7 @@ def test_causes_stand_before_symptoms_whatever_is_more_frequent() -> None:
     symptom, cause = reason("POSE_MAY_BE_WRONG"), reason("FROZEN_IMAGE")
     rows = [(100 * k, 1, symptom | (cause if k == 5 else 0)) for k in range(8)]
     (said,) = words(*rows)
-    assert said.endswith(f": {SHORT['FROZEN_IMAGE']}, {SHORT['POSE_MAY_BE_WRONG']}")
+    assert said.endswith(f": {SHORT['FROZEN_IMAGE']} (1 of them), {SHORT['POSE_MAY_BE_WRONG']}")
 
 
 def test_flicker_is_one_spell_and_what_lies_apart_is_two() -> None:

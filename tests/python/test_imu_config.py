@@ -60,11 +60,13 @@ def test_noises_are_those_of_the_data_sheet_so_many_times(name: str, recording: 
     assert times > 1
 
 
-def test_imu_conf_leaves_the_noises_to_the_recording(recording: Path) -> None:
+def test_imu_conf_leaves_pixels_and_gravity_to_the_recording_and_says_the_least_noise(
+    recording: Path,
+) -> None:
     found, told = settings("imu", recording), noisy().recording.header.noise
-    assert float(found["gyro-noise"]) == told.gyro_noise
-    assert float(found["accel-walk"]) == told.accel_walk
     assert float(found["pixel-sigma"]) == told.pixel_sigma_px
+    assert float(found["gravity"]) == told.gravity
+    assert float(found["gyro-noise"]) == 1.7e-4 < told.gyro_noise
 
 
 # --- the real recordings, in the first part of each, so that it takes seconds ---------------------

@@ -55,7 +55,7 @@ def test_what_cannot_be_moved_is_refused(tmp_path: Path, pelorus: Run) -> None:
     drive.write(source)
     for by in ("0", "nan", "3"):
         said = pelorus("convert", "late-turns", source, target, "--late", by, status=1)
-        assert "seconds are due, up to 2" in said.err
+        assert "seconds are expected, up to 2" in said.err
     none = np.empty((0, 3))
     replace(drive, twist_t_ns=drive.twist_t_ns[:0], v_B_mps=none, w_B_radps=none).write(source)
     said = pelorus("convert", "late-turns", source, target, "--late", "0.1", status=1)

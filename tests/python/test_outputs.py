@@ -62,7 +62,7 @@ def test_the_standard_output_holds_the_recording_and_nothing_else(tmp_path: Path
 
 
 def test_a_command_that_is_ended_removes_what_it_has_begun(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "pelorus", "simulate", "out.plr", "--duration", "3000"]
+    command = [sys.executable, "-m", "pelorus", "simulate", "out.plr", "--duration", "300"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as running:
         while running.poll() is None and not (tmp_path / "out.plr.part").exists():
             time.sleep(0.01)

@@ -3,7 +3,7 @@
 the landmarks in sight (docs/NUMERICS.md, section 10).
 
 Retracted by the pose's correction instead of by what the landmarks share, the gate turned away 5 %
-of these sound observations; 1.0 % is due, and 1.2 % was measured.
+of these sound observations; 1.0 % is expected, and 1.2 % was measured.
 """
 
 from __future__ import annotations

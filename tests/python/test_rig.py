@@ -188,7 +188,7 @@ def test_four_numbers_are_radtan_or_a_fisheye_only_if_somebody_says_so(tmp_path:
     cameras = fisheye()
     path = tmp_path / "fisheye.yml"
     path.write_text(opencv_text(**opencv_matrices(cameras)))
-    with pytest.raises(ForeignFileError, match="--lens radtan or --lens equidistant is due"):
+    with pytest.raises(ForeignFileError, match="--lens radtan or --lens equidistant is expected"):
         rig_files.read_rig([path])
     rig = rig_files.read_rig([path], LensModel.EQUIDISTANT)
     assert_rectifies(rig.on_body(cameras.T_LB), cameras)
@@ -270,13 +270,17 @@ def harmed(content: dict[str, Any], camera: str, **changes: Any) -> dict[str, An
         (
             "cam0",
             {"intrinsics": [1, 2, 3]},
-            "cam0: intrinsics is [1, 2, 3]; 4 finite numbers are due",
+            "cam0: intrinsics is [1, 2, 3]; 4 finite numbers are expected",
         ),
-        ("cam0", {"intrinsics": [-1.0, 2, 3, 4]}, "[fx, fy, cx, cy] in px is due"),
+        ("cam0", {"intrinsics": [-1.0, 2, 3, 4]}, "[fx, fy, cx, cy] in px is expected"),
         ("cam1", {"distortion_model": "fov"}, "none or radtan or"),
-        ("cam1", {"distortion_coeffs": [1, 2]}, "4 or 5 or 8 or 12 or 14 numbers are due for radt"),
+        (
+            "cam1",
+            {"distortion_coeffs": [1, 2]},
+            "4 or 5 or 8 or 12 or 14 numbers are expected for radt",
+        ),
         ("cam1", {"distortion_coeffs": ["a", 2, 3, 4]}, "cam1: distortion_coeffs is ['a', 2, 3, 4"),
-        ("cam0", {"resolution": "big"}, "resolution is 'big'; [width, height] in px is due"),
+        ("cam0", {"resolution": "big"}, "resolution is 'big'; [width, height] in px is expected"),
         ("cam0", {"T_cam_imu": [[1, 0], [0, 1]]}, "T_cam_imu is [[1, 0], [0, 1]]; 4 x 4 finite"),
         ("cam0", {"T_imu_cam": matrix(Cameras().T_LB)}, "has T_cam_imu and T_imu_cam; one of them"),
         ("cam1", {"T_cn_cnm1": matrix(se3.inverse(Cameras().T_RL))}, "differ by 0.22 m and 0.05"),
@@ -302,8 +306,11 @@ def test_a_mistake_in_a_calibration_is_told_by_file_camera_and_key(
         ("- 1\n- 2\n", "is YAML without names"),
         ("a: 1\na: 2\n", "is no YAML: found duplicate key"),
         ("x: 1\n", "is no calibration that is known; Kalibr's camchain, sensor.yaml of"),
-        ("cam0: 3\n", "has one camera, cam0; cam0 and cam1 are due"),
-        ("gyroscope_noise_density: 1e-3\n", "is of an IMU alone; one of the cameras is due too"),
+        ("cam0: 3\n", "has one camera, cam0; cam0 and cam1 are expected"),
+        (
+            "gyroscope_noise_density: 1e-3\n",
+            "is of an IMU alone; one of the cameras is expected too",
+        ),
         ("[" * 1500, "is nested too deep"),
         ("x: !!python/object:os.system 1\n", "is no YAML: could not determine a constructor"),
     ],
@@ -355,7 +362,7 @@ def test_metres_are_due_and_cameras_side_by_side(tmp_path: Path) -> None:
         return str(caught.value)
 
     R = Cameras().T_RL.R
-    assert "the cameras stand 110 apart; 0.001 to 5 m are due: are these millimetres" in said(
+    assert "the cameras stand 110 apart; 0.001 to 5 m are expected: are these millimetres" in said(
         Poses(R, np.array([-110.0, 0, 0]))
     )
-    assert "cameras side by side are due" in said(Poses(R, np.array([-0.01, 0.2, 0])))
+    assert "cameras side by side are expected" in said(Poses(R, np.array([-0.01, 0.2, 0])))

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pelorus import se3
-from pelorus.converters.streams import Seen, Streams, Twists, recording
+from pelorus.converters.streams import RawTracks, Streams, Twists, recording
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.rig import read as rig_files
@@ -260,7 +260,7 @@ def opencv_xml(cameras: Cameras, folder: Path) -> list[Path]:
 
 
 def zed(cameras: Cameras, folder: Path) -> list[Path]:
-    """Of three resolutions, the one of the pictures in the middle."""
+    """Writes three resolutions, the pictures' one in the middle."""
     rx, cv, rz = Rotation.from_matrix(cameras.T_RL.R).as_rotvec()
     baseline, ty, tz = -1e3 * cameras.T_RL.p
     text = ""
@@ -323,13 +323,13 @@ def test_tracks_are_of_the_resolution_that_holds_their_pixels(tmp_path: Path) ->
     calibrated = rig_files.of_rig(rig, "x")
     t_ns = np.array([10**9])
     twists = Twists(Path("t"), np.array([0, 2 * 10**9]), *np.zeros((2, 2, 3)))
-    made = recording(Streams(calibrated, Seen(Path("s"), t_ns, tracks), twists))
+    made = recording(Streams(calibrated, RawTracks(Path("s"), t_ns, tracks), twists))
     s_B = se3.apply(se3.inverse(cameras.T_LB), q_L)
     due = project(made.header.camera, se3.apply(made.T_CB, s_B))
     assert np.abs(made.tracks.pixels - due).max() < 1e-3
     beyond = replace(tracks, pixels=tracks.pixels + 3000)
     with pytest.raises(ForeignFileError, match="beyond every resolution"):
-        recording(Streams(calibrated, Seen(Path("s"), t_ns, beyond), twists))
+        recording(Streams(calibrated, RawTracks(Path("s"), t_ns, beyond), twists))
 
 
 def rectified(cameras: Cameras, folder: Path, before: bool) -> list[Path]:
@@ -406,12 +406,16 @@ def changed(paths: list[Path], old: str, new: str) -> list[Path]:
 
 def test_what_lacks_of_a_pair_is_said(tmp_path: Path) -> None:
     c, d = Cameras(), tmp_path
-    assert "num_of_cam: 2 is due" in said(changed(vins(c, d), "num_of_cam: 2", "num_of_cam: 1"))
+    assert "num_of_cam: 2 is expected" in said(
+        changed(vins(c, d), "num_of_cam: 2", "num_of_cam: 1")
+    )
     vins(c, d)
-    assert "VINS-Fusion's configuration (body_T_cam0, cam0_calib) is due" in said([d / "left.yaml"])
+    assert "VINS-Fusion's configuration (body_T_cam0, cam0_calib) is expected" in said(
+        [d / "left.yaml"]
+    )
     (d / "right.yaml").unlink()
     assert "right.yaml: cannot be read" in said([d / "config.yaml"])
-    assert "1 files of cameras; 2 of camera_info of ROS are due" in said(camera_info(c, d)[:1])
+    assert "1 files of cameras; 2 of camera_info of ROS are expected" in said(camera_info(c, d)[:1])
     assert "neither camera has a baseline" in said([camera_info(c, d)[0]] * 2)
     assert "model_type is 'SCARAMUZZA'" in said(
         [vins(c, d)[0], *changed([d / "left.yaml"], "PINHOLE", "SCARAMUZZA"), d / "right.yaml"]
@@ -419,7 +423,7 @@ def test_what_lacks_of_a_pair_is_said(tmp_path: Path) -> None:
     assert "is of one camera" in said(changed(orb3(c, d), "Stereo.T_c1_c2", "Other"))
     both = changed(rectified(RECTIFIED, d, True), "Camera.k1: 0", "Camera.k1: -0.3")
     assert "has a baseline alone, and a distortion (Camera.k1)" in said(both)
-    assert "files of one are due" in said([*orb3(c, d), *camera_info(c, d)])
+    assert "files of one are expected" in said([*orb3(c, d), *camera_info(c, d)])
     assert "is no XML" in said(changed(opencv_xml(c, d), "</opencv_storage>", ""))
     assert "is XML of html" in said([_written(d / "x.xml", "<html></html>")])
     assert "lacks rx" in said(changed(zed(c, d), "RX_2K", "RX_4K"))

@@ -5,23 +5,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from odom_samples import T_IB, Sample, nees, sample
 from pelorus import se3
-from pelorus.frames import Stereo, Twist
-from pelorus.layout import Floats
-from pelorus.online.drive import Setup
-from pelorus.online.odometry import Given, Odometry, adjoint, level
+from pelorus.online.odometry import adjoint, level, turned
 from pelorus.se3 import Poses
-from pelorus.simulation.simulate import Options, simulate
 from pelorus_ros import conventions
 from pelorus_ros.mounting import Mounting, NoChain
 from replay_drive import BIN
 from robot_messages import transform
 from scipy.spatial.transform import Rotation
 
-DRIVES = 200
-# Of the base: half a metre off the body, and turned in all three axes.
-T_IB = Poses(Rotation.from_rotvec([0.4, -0.9, 2.0]).as_matrix(), np.array([0.4, -0.3, 0.2]))
-START_SIGMA = np.array([0.05, 0.03, 0.02, 0.01, 0.02, 0.03])
+DRIVES = 24  # tests/recordings/odom_covariance.py drives 200
 
 
 @pytest.fixture(autouse=True)
@@ -29,45 +23,28 @@ def built(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PELORUS_BIN", str(BIN))
 
 
-def error_and_covariances(seed: int) -> tuple[Floats, Floats]:
-    """Of the last frame's pose of the base in odom: the error (6,) and the covariance, as ROS has
-    them. The robot is told where it begins, with an error of the covariance that it is told.
-    """
-    chance = np.random.default_rng(seed)
-    recording = simulate(
-        Options(seed=seed, duration_s=3.0, twist_rate_hz=20.0, observations=25, landmarks=400)
-    ).recording
-    data = [m for m in recording.messages() if isinstance(m, Twist | Stereo)]
-    truth = se3.compose(recording.truth, T_IB)
-    begin = truth.at(0)
-    off = START_SIGMA * chance.standard_normal(6)  # of what is told: T = told Exp(off)
-    told = se3.compose(begin, se3.inverse(se3.exp(off[:3], off[3:])))
-    P = conventions.from_ros(told.R, conventions.to_ros(told.R, np.diag(START_SIGMA**2)))
-    odometry = Odometry(Setup(recording.header, recording.settings), T_IB, given=Given(told, P))
-    odom = [one for m in data for one in odometry.add(m)][-1]
-    at = int(np.nonzero(recording.truth_t_ns == odom.t_ns)[0][0])
-    error = conventions.error_in_ros(truth.at(at), odom.T_OB)
-    return error, conventions.to_ros(odom.T_OB.R, odom.covariance)
+@pytest.fixture(scope="module")
+def samples() -> list[Sample]:
+    with pytest.MonkeyPatch.context() as there:
+        there.setenv("PELORUS_BIN", str(BIN))
+        return [sample(seed) for seed in range(1, DRIVES + 1)]
 
 
-def test_covariance_of_odom_is_that_of_its_errors_about_the_fixed_axes() -> None:
-    """NEES/6 of 200 drives, and NEES/3 of each block; each axis' own errors against its sigma."""
-    samples = [error_and_covariances(seed) for seed in range(1, DRIVES + 1)]
-    whole = np.mean([e @ np.linalg.solve(C, e) for e, C in samples]) / 6
-    place = np.mean([e[:3] @ np.linalg.solve(C[:3, :3], e[:3]) for e, C in samples]) / 3
-    turn = np.mean([e[3:] @ np.linalg.solve(C[3:, 3:], e[3:]) for e, C in samples]) / 3
-    print(f"NEES/6 {whole:.3f}, position {place:.3f}, rotation {turn:.3f}")
-    assert 0.9 < whole < 1.1
-    assert 0.9 < place < 1.1
-    assert 0.9 < turn < 1.1
+def test_covariance_of_odom_is_that_of_its_errors_about_the_fixed_axes(
+    samples: list[Sample],
+) -> None:
+    """NEES/6 and NEES/3 of each block: three sigma of a mean of so many drives, 0.35 and 0.5."""
+    found = nees(samples)
+    assert 0.65 < found.whole < 1.35
+    assert 0.5 < found.position < 1.5
+    assert 0.5 < found.rotation < 1.5
 
 
-def test_a_covariance_in_other_axes_would_not_pass() -> None:
-    """The test above can fail: in the body's axes the sigmas belong to other errors."""
-    samples = [error_and_covariances(seed) for seed in range(1, 41)]
+def test_a_covariance_in_other_axes_would_not_pass(samples: list[Sample]) -> None:
+    """The test above can fail: turned by 90 degrees the sigmas belong to other errors."""
     R = Rotation.from_rotvec([0, 0, np.pi / 2]).as_matrix()
-    wrong = [e @ np.linalg.solve(conventions.turned(R, C), e) / 6 for e, C in samples]
-    assert np.mean(wrong) > 1.3
+    wrong = nees([Sample(error, turned(R, C)) for error, C in samples])
+    assert wrong.whole > 1.35
 
 
 def test_errors_and_covariances_follow_the_same_first_order_way() -> None:

@@ -15,12 +15,12 @@ import pytest
 from pelorus.cli import main
 from pelorus.errors import PelorusError
 from pelorus.frames import Imu, Message, Stereo
-from pelorus.simulation.imu import Imu as SimulatedImu
+from pelorus.online.diagnosis import Level, of_health
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options as Drive
 from pelorus.simulation.simulate import simulate
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options, misspelt, table
-from pelorus_ros.status import Level, of_health
 from replay_drive import BIN
 from robot_messages import (
     camera_info,

@@ -85,14 +85,16 @@ def test_chains_that_lack_move_or_are_told_twice_end_in_a_sentence(
     cut = {pair: T for pair, T in whole.items() if pair != ("plate", "base_link")}
     parts: list[tuple[dict[Any, Any], dict[Any, Any], str]] = [
         (cut, {}, "no chain of transforms joins 'base_link' and 'left_optical': they end at "
-                  "'base_link' and at 'plate'; --extrinsic FILE is due"),
+                  "'base_link' and at 'plate'; --extrinsic FILE is expected"),
         (cut, whole, ""),
         (whole | optical, {}, "which has the optical frame left_optical_frame: in which does"),
         ({("gimbal", "left_optical"): whole["plate", "left_optical"]},
          {("base_link", "gimbal"): whole["base_link", "mast"]},
-         "'base_link' to 'gimbal' moves (/tf), so it tells no mounting; --extrinsic FILE is due"),
+         "'base_link' to 'gimbal' moves (/tf), so it tells no mounting; --extrinsic FILE is "
+         "expected"),
         ({("a", "b"): whole["base_link", "mast"]}, {}, "no transform of /tf_static has the frame "
-         "'base_link'; --extrinsic FILE is due, or --body-frame and --camera-frame, one of a, b"),
+         "'base_link'; --extrinsic FILE is expected, or --body-frame and --camera-frame, one "
+         "of a, b"),
     ]  # fmt: skip
     target, calibration = tmp_path / "out.plr", of_cameras(tmp_path, drive)
     for k, (static, dynamic, said) in enumerate(parts):
@@ -123,7 +125,10 @@ def test_frames_that_nobody_names_are_asked_for_and_may_be_given(
     bag = written(recorder, tmp_path, "mcap")
     target, calibration = tmp_path / "out.plr", of_cameras(tmp_path, drive)
     said = pelorus("convert", "ros", bag, target, *calibration, status=1).err
-    assert "the left camera's messages do not name their frame; --camera-frame NAME is due" in said
+    assert (
+        "the left camera's messages do not name their frame; --camera-frame NAME is expected"
+        in said
+    )
     camera = ("--camera-frame", "left_optical", "--body-frame", "base_link")
     pelorus("convert", "ros", bag, target, *calibration, *camera)
     assert_on_body(target, drive)
@@ -155,7 +160,8 @@ def test_a_gyro_on_another_frame_is_turned_into_the_body(
         (("/d455/camera0/i", "/d455/camera1/i", "/d455/camera2/i"), False, "/d455/camera0/i"),
         (("/cam0/image_raw", "/cam1/image_raw"), True, "/cam1/image_raw"),
         (("/left/image_raw", "/right/image_raw", "/left/image_rect", "/right/image_rect"), False,
-         "are due (sensor_msgs/msg/Image, sensor_msgs/msg/CompressedImage), or --tracks-topic; "
+         "are expected (sensor_msgs/msg/Image, sensor_msgs/msg/CompressedImage), or "
+         "--tracks-topic; "
          "pairs are /left/image_raw and /right/image_raw, /left/image_rect and /right/image_rect;"),
         (("/front", "/rear"), False, "which topics are the left and the right camera?"),
     ],

@@ -162,7 +162,7 @@ def test_an_imu_whose_clock_was_set_back_is_refused_whatever_the_bag(
         calibration = on_body(tmp_path, drive)
         said = pelorus("convert", "ros", bag, target, *calibration, status=1).err
         assert "/imu: stamps go back by 2.4" in said, said
-        assert "--stamps log is due" in said
+        assert "--stamps log is expected" in said
         assert not target.exists()
         limits = re.findall(r"(--until|--from) (\d+\.\d+)", said)
         counts = []
@@ -399,7 +399,7 @@ def test_twists_of_a_file_are_turned_by_their_own_orientation(
     pelorus("convert", "ros", bag, target, *words, "--twist-in", "world-velocity")
     assert np.abs(twists_of(target) - np.hstack((drive.v_B_mps, drive.w_B_radps))).max() < 1e-6
     said = pelorus("convert", "ros", bag, target, *words, "--twist-in", "poses", status=1).err
-    assert "twists.csv: has no places; px_m, py_m, pz_m are due" in said
+    assert "twists.csv: has no places; px_m, py_m, pz_m are expected" in said
     (tmp_path / "twists.csv").write_text(
         "\n".join([head, *[",".join(row.split(",")[:7]) for row in rows], ""])
     )

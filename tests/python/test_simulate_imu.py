@@ -280,7 +280,7 @@ def test_a_filter_that_is_told_of_the_other_clock_finds_its_truth(
         ({"imu_faults": ImuFaults(imu_clock_percent=80.0)}, "--imu-clock is 80.0"),
         (
             {"imu": {"imu_rate_hz": 0.0}, "imu_faults": ImuFaults(accel_in_g=True)},
-            "--accel-in-g is True: --imu-rate beside it is due",
+            "--accel-in-g is True: --imu-rate beside it is expected",
         ),
         ({"mishaps": Mishaps(slip=0.5)}, "--slip is 0.5: twists, so no --imu-rate"),
         ({"mishaps": Mishaps(dead_encoder=Span(1.0))}, "--dead-encoder"),

@@ -16,7 +16,7 @@ from drives import PERFECT, clean
 from pelorus.frames import Reading
 from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.readings import Sensing
 from pelorus.simulation.settings import Span
@@ -222,10 +222,10 @@ def test_two_sensors_of_a_kind_are_two_files(tmp_path: Path, pelorus: Run) -> No
 
 
 BAD = [
-    ("wheel.csv", "vx_mps", "v", "measures nothing; some of vx_mps, vy_mps, vz_mps are due"),
+    ("wheel.csv", "vx_mps", "v", "measures nothing; some of vx_mps, vy_mps, vz_mps are expected"),
     ("wheel.csv", "sigma_mps", "s", "lacks the column sigma_mps"),
     ("wheel.csv", "0.1,2,0.1", "0.1,2,0", "row 3: sigma_mps is 0, a positive number"),
-    ("wheel.csv", "0.1,2,0.1", "0.1,fast,0.1", "row 3: vx_mps is 'fast', a number is due"),
+    ("wheel.csv", "0.1,2,0.1", "0.1,fast,0.1", "row 3: vx_mps is 'fast', a number is expected"),
     ("wheel.csv", "0.1,2,0.1", "0.1,nan,0.1", "vx_mps is not finite"),
     ("wheel.csv", "0.1,2,0.1", "0.1,1e12,0.1", "row 3: vx_mps is 1e+12, at most 1e+09"),
     ("wheel.csv", "at_y_m", "at_m", "lacks the column at_y_m"),
@@ -358,13 +358,13 @@ def test_no_batch_of_an_imu_reaches_beyond_a_reading_beside_it(
     tmp_path: Path, sensing: dict[str, Sensing]
 ) -> None:
     path = tmp_path / "imu.plr"
-    options = Options(duration_s=20.0, imu=Imu(imu_rate_hz=200.0), readings=sensing)
+    options = Options(duration_s=20.0, imu=SimulatedImu(imu_rate_hz=200.0), readings=sensing)
     simulate(options).recording.write(path)
     assert used_of_all(path) > 0
 
 
 def test_an_imu_and_wheels_of_two_csv_files_are_both_taken(tmp_path: Path, pelorus: Run) -> None:
-    imu = Imu(imu_rate_hz=200.0, rest_s=1.5)
+    imu = SimulatedImu(imu_rate_hz=200.0, rest_s=1.5)
     drive = simulate(Options(duration_s=20.0, imu=imu, pixel_sigma_px=0.5)).recording
     files = csv_files(tmp_path, drive)[2:]  # all but the twists
     files += ["--imu", imu_csv(tmp_path, drive)]

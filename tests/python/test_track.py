@@ -282,13 +282,17 @@ def _all_but_two(path: Path) -> None:
     [
         ("right", Path.unlink, "right: lacks the partner of 4.png in "),
         ("left", Path.unlink, "left: lacks the partner of 4.png in "),
-        ("right", _resize, "4.png: has 100 x 100 pixels; 400 x 200 are due, which the left ones"),
-        ("left", _resize, "4.png: has 100 x 100 pixels; 400 x 200 are due, which the first"),
+        (
+            "right",
+            _resize,
+            "4.png: has 100 x 100 pixels; 400 x 200 are expected, which the left ones",
+        ),
+        ("left", _resize, "4.png: has 100 x 100 pixels; 400 x 200 are expected, which the first"),
         ("left", _cut, "4.png: cannot be read as a picture: image file is truncated; a whole PNG"),
         ("right", lambda p: p.write_text("no picture"), "4.png: cannot be read as a picture: "),
         ("right", lambda p: p.write_bytes(b""), "4.png: the file is empty"),
         ("left", _blank, "no corner could be followed for 3 frames; pictures with texture"),
-        ("left", _all_but_two, "left: has 2 pictures; at least 3 are due"),
+        ("left", _all_but_two, "left: has 2 pictures; at least 3 are expected"),
     ],
 )
 def test_bad_pictures_are_named_and_nothing_is_left_behind(
@@ -318,7 +322,10 @@ def test_calls_that_make_no_sense_are_refused_with_what_would_be_right(
     rate = ("--rate", 10)
     for words, said in (
         ((left, right, out), "left: the name 0 is no time in ns: when were the pictures taken?"),
-        ((left, left, out, *rate), "is given as the left and as the right folder; two are due"),
+        (
+            (left, left, out, *rate),
+            "is given as the left and as the right folder; two are expected",
+        ),
         (
             (right, left, out, *rate),
             "further left, as a rectified pair would; are left and right sw",
@@ -327,9 +334,12 @@ def test_calls_that_make_no_sense_are_refused_with_what_would_be_right(
         ((folder, right, out, *rate), "out.folder: holds no picture; .png"),
         ((left, right, tmp_path / "no" / "o.csv", *rate), "cannot be written: there is no folder"),
         ((left, right, folder, *rate), "out.folder: cannot be written: is a folder"),
-        ((left, right, out, "--times", few), "times.txt: has 2 times; 6 are due, one for each"),
-        ((left, right, out, "--rate", 0), "a rate of 0 Hz: 0.001 to 100000 is due"),
-        ((left, right, out, *rate, "--window", 8), "window 8: an odd number is due"),
+        (
+            (left, right, out, "--times", few),
+            "times.txt: has 2 times; 6 are expected, one for each",
+        ),
+        ((left, right, out, "--rate", 0), "a rate of 0 Hz: 0.001 to 100000 is expected"),
+        ((left, right, out, *rate, "--window", 8), "window 8: an odd number is expected"),
         ((left, right, out, *rate, "--corners", 3), "corners 3: 8 to "),
         ((left, right, out, *rate, "--sheet", out), "is given for the tracks and for the sheet"),
         (
@@ -380,7 +390,7 @@ def draws(poses: Path, klt: Path, first: int) -> Iterator[tuple[Recording, float
     source = matlab.klt(klt, TwistTiming.END)
     folders = poses.parent / "image_l", poses.parent / "image_r"
     pairs = images.pairs(*folders)
-    tracks = track((images.read(pair) for pair in pairs[first:]), folders, Settings())
+    tracks = track((images.read(pair) for pair in pairs[first:]), folders, Settings(corners=120))
     assert np.median(np.bincount(tracks.id)) >= 5
     T_CB, cameras = source.T_CB, trajectory.read_kitti(poses)
     bodies = se3.compose(se3.compose(se3.inverse(T_CB), cameras), T_CB).at(slice(first, None))

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import found_in, injections
@@ -82,7 +83,7 @@ def test_twists_that_were_never_filled_in_are_named() -> None:
     assert "only the pose" in said[0].words
 
 
-@pytest.mark.parametrize("seed", [7202, 7205])
+@pytest.mark.parametrize("seed", draws([7202, 7205]))
 def test_velocities_in_world_axes_are_named_so(seed: int) -> None:
     clean = moving(seed)
     t_ns = clean.twist_t_ns
@@ -111,7 +112,7 @@ def test_no_scale_is_read_across_gaps_and_the_way_in_them_is_told() -> None:
     assert {fault.name for fault in said} <= {"time-gap"}
 
 
-@pytest.mark.parametrize("seed", [74, 75])
+@pytest.mark.parametrize("seed", draws([74, 75]))
 def test_wrong_right_pictures_are_no_lever(seed: int) -> None:
     """In a tenth of the pairs the right picture is the one of three frames before."""
     clean = recording(drive("carried", BY_IMU, seed).streams)
@@ -125,7 +126,9 @@ def test_wrong_right_pictures_are_no_lever(seed: int) -> None:
     assert not {fault.name for fault in said} & {"lever", "scale", "axes", "no-fit"}
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("rover", 501), ("drone", 502), ("carried", 503)])
+@pytest.mark.parametrize(
+    ("kind", "seed"), draws([("rover", 501), ("drone", 502), ("carried", 503)])
+)
 def test_velocities_of_another_point_of_the_robot_are_named(kind: str, seed: int) -> None:
     """As of an axle, where the extrinsic counts from the robot's middle. On a level floor nothing
     tells how high it is.

@@ -34,7 +34,7 @@ S = 1_000_000_000
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a drive whose wheels slip, with a name that nobody should trust."""
+    """Returns the log of a drive whose wheels slip, with a malicious name."""
     folder = tmp_path_factory.mktemp("view")
     mishaps = Mishaps(slip=0.5, slip_span=Span(12.0, 3.0))
     recording = simulate(Options(seed=4, duration_s=20.0, mishaps=mishaps)).recording
@@ -339,5 +339,5 @@ def test_a_log_that_is_cut_or_bare_is_shown_as_far_as_it_goes(
     silent = tmp_path / "silent.plr"
     write_file(silent, [m for m in kept if not isinstance(m, Report)], len(kept))
     words = pelorus("explain", silent, status=1).err
-    assert words == f"error: {silent}: holds no REPORT of a frame: a whole log is due\n"
+    assert words == f"error: {silent}: holds no REPORT of a frame: a whole log is expected\n"
     assert not any(name.startswith("/curves/doubt") for name in read_rrd(tmp_path / "bare.rrd"))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from bags import Recorder
 from converted import Run, messages_of
+from draws import draws
 from pelorus import se3
 from pelorus.converters import wheels
 from pelorus.converters.wheels import STANDSTILL, WHEEL, Rolling
@@ -18,7 +19,7 @@ from pelorus.frames import Header, Pose, Process, Reading, Twist
 from pelorus.layout import Floats, unpack_symmetric
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.readings import Sensing
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
@@ -68,13 +69,13 @@ def test_a_body_that_cannot_slide_is_measured_along_all_axes() -> None:
 DARK = Span(10.0, 60.0)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", draws([1, 2]))
 def test_a_minute_in_the_dark_costs_a_percent_of_the_way_if_the_body_cannot_slide(
     seed: int, tmp_path: Path
 ) -> None:
     """At 1 m/s, with readings of 0 across the wheels; the IMU alone is tens of metres off."""
     wheel = Sensing(rate_hz=50.0, axes="xyz", sigma=(0.03, 0.05, 0.05))
-    imu = Imu(imu_rate_hz=200.0, rest_s=2.0)
+    imu = SimulatedImu(imu_rate_hz=200.0, rest_s=2.0)
     options = Options(seed=seed, duration_s=70.0, speed_mps=1.0, imu=imu, readings={"wheel": wheel})
     drive = simulate(options).recording
     t_s = (drive.frame_t_ns - drive.frame_t_ns[0]) / SECOND
@@ -112,7 +113,9 @@ def test_the_body_stands_while_all_wheels_read_zero() -> None:
 @pytest.fixture(scope="module")
 def drive() -> Recording:
     """Twenty seconds with an IMU, some of which the body stands."""
-    options = Options(duration_s=20.0, imu=Imu(imu_rate_hz=200.0, rest_s=1.5), stop=Span(8.0, 5.0))
+    options = Options(
+        duration_s=20.0, imu=SimulatedImu(imu_rate_hz=200.0, rest_s=1.5), stop=Span(8.0, 5.0)
+    )
     return simulate(options).recording
 
 
@@ -151,7 +154,7 @@ def test_a_bags_wheels_go_beside_its_imu_along_their_own_axes(
 ) -> None:
     words = [*given, tmp_path / "out.plr"]
     outcome = pelorus(*words, "--wheel-topic", "/odom", status=1)
-    assert "/odom: messages tell no covariance; --wheel-sigma M/S is due" in outcome.err
+    assert "/odom: messages tell no covariance; --wheel-sigma M/S is expected" in outcome.err
     said = pelorus(*words, "--wheel-topic", "/odom", "--wheel-sigma", 0.05).out
     assert "/odom: the wheels sit as /tf_static says" in " ".join(said.split())
     assert "the wheels stand: " in said

@@ -332,7 +332,7 @@ def test_no_reading_of_an_imu_or_too_many_do_not_fit_a_frame(count: int) -> None
 
 
 def test_readings_of_an_imu_in_another_shape_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"shapes \(3,\) and \(3, 3\) where \(3, 3\) is due"):
+    with pytest.raises(ValueError, match=r"shapes \(3,\) and \(3, 3\) where \(3, 3\) is expected"):
         Imu(1, np.zeros(3), np.zeros((3, 3))).pack()
 
 

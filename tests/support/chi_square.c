@@ -15,7 +15,8 @@ void chi_square_demand(const char *what, double per_freedom, unsigned freedom) {
     char message[96];
     double low, high;
     chi_square_bounds(freedom, &low, &high);
-    snprintf(message, sizeof message, "%s: NEES %.3f per degree of freedom, %.3f to %.3f is due",
-             what, per_freedom, low, high);
+    snprintf(message, sizeof message,
+             "%s: NEES %.3f per degree of freedom, %.3f to %.3f is expected", what, per_freedom,
+             low, high);
     TEST_ASSERT_TRUE_MESSAGE(per_freedom > low && per_freedom < high, message);
 }

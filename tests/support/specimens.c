@@ -227,6 +227,7 @@ bool specimen_same_state(const plr_filter *a, const plr_filter *b) {
     memcpy(&copy, a, sizeof copy);
     memcpy(&copy.work, &b->work, sizeof copy.work);
     memcpy(&copy.totals, &b->totals, sizeof copy.totals);
+    memcpy(&copy.evidence, &b->evidence, sizeof copy.evidence); /* of one frame */
     memcpy(&copy.guard, &b->guard, sizeof copy.guard);
     return memcmp(&copy, b, sizeof copy) == 0 && a->totals.diverged_ns == b->totals.diverged_ns;
 }

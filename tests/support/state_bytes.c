@@ -59,6 +59,7 @@ bool state_bytes_same_filter(const plr_filter *a, const plr_filter *b) {
         return false;
     memcpy(&copy, a, sizeof copy);
     memcpy(&copy.work, &b->work, sizeof copy.work);
+    memcpy(&copy.evidence, &b->evidence, sizeof copy.evidence); /* of one frame */
     memcpy(&copy.guard, &b->guard, sizeof copy.guard);
     memcpy(copy.belief.slots + a->belief.count, b->belief.slots + a->belief.count,
            (PLR_MAX_LANDMARKS - a->belief.count) * sizeof *copy.belief.slots);

@@ -52,7 +52,7 @@ static int reserve(const replay_options *o, const census *c, const plr_config *c
                 (double)there / GB);
     if (bytes > there) {
         fprintf(stderr,
-                PELORUS_NAME ": %s: not enough memory: %.2f GB are due and %.2f GB can be had. "
+                PELORUS_NAME ": %s: not enough memory: %.2f GB are needed and %.2f GB can be had. "
                              "--max-depth leaves out far landmarks; pelorus-replay-f64 keeps as "
                              "many as it has slots\n",
                 o->input, (double)bytes / GB, (double)there / GB);

@@ -8,6 +8,7 @@
 
 #include "filter/correction.h"
 #include "filter/gate.h"
+#include "sensor/kept.h"
 #include "sensor/stereo.h"
 #include "state/calibration.h"
 #include "state/covariance.h"

@@ -56,7 +56,7 @@ static void see(plr_seen_known *known, const double q[3], double map_sigma, doub
         known->P[4 * i] = (plr_real)(map_sigma * map_sigma);
         known->z[i] = z[i] + (plr_real)(i < 2 ? noise[i] : 0.5 * (noise[2] + noise[3]));
     }
-    known->pixel_variance = filter.camera.pixel_variance;
+    known->pixel_variance = f.camera.pixel_variance;
     known->gap_d2 = (plr_real)((noise[2] - noise[3]) * (noise[2] - noise[3]) / 2);
 }
 

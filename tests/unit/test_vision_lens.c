@@ -7,7 +7,7 @@
 #include "support/random.h"
 #include "vision/lens.h"
 
-static const double eps = PLR_EPSILON;
+static const double eps = (double)PLR_EPSILON;
 static rng chance;
 
 void setUp(void) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A calibration as JSON: what a HEADER needs, by name."""
+"""Reads a calibration from JSON: the named values of a HEADER."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ IMAGE_SIZE_MAX = 65535
 
 
 def read(path: Path) -> Header:
-    """The HEADER that the file describes; unknown names are refused, they may be typing errors."""
+    """Returns the HEADER that the file describes; refuses unknown names, perhaps typing errors."""
     return _Calibration(path, foreign.json_object(path)).header()
 
 
 def read_extrinsic(path: Path) -> Poses:
-    """T_CB of a file that holds nothing else, or of a whole calibration."""
+    """Returns T_CB from a file that has nothing else, or from a whole calibration."""
     return _Calibration(path, foreign.json_object(path)).extrinsic()
 
 
@@ -58,7 +58,7 @@ class _Calibration(Named):
     def _name(self) -> str:
         name = self.content.get("name", self.path.stem)
         if not isinstance(name, str):
-            raise self.error("name", name, "words are due")
+            raise self.error("name", name, "words are expected")
         return header_name(name)
 
     def extrinsic(self) -> Poses:
@@ -67,8 +67,8 @@ class _Calibration(Named):
             raise ForeignFileError(
                 self.path,
                 f"has {' and '.join(f'R_{pair}' for pair in given) or 'neither R_CB nor R_BC'}",
-                due="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
-                "(the camera's pose in the body) are due",
+                expected="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
+                "(the camera's pose in the body) are expected",
             )
         pair = given[0]
         R = arrays.rotation(self.path, f"R_{pair}", self.array(f"R_{pair}", 3, 3))
@@ -80,13 +80,13 @@ class _Calibration(Named):
             return standard
         word = self.content[name]
         if not isinstance(word, str) or word not in choices:
-            raise self.error(name, word, f"{' or '.join(choices)} is due")
+            raise self.error(name, word, f"{' or '.join(choices)} is expected")
         return choices[word]
 
     def _size(self, name: str) -> int:
         size = self.content.get(name, 0)
         if not isinstance(size, int) or not 0 <= size <= IMAGE_SIZE_MAX:
-            raise self.error(name, size, f"0 to {IMAGE_SIZE_MAX} is due")
+            raise self.error(name, size, f"0 to {IMAGE_SIZE_MAX} is expected")
         return size
 
     def _noise(self) -> Noise:
@@ -95,7 +95,7 @@ class _Calibration(Named):
             isinstance(value, (int, float)) and np.isfinite(float(value))
             for value in given.values()
         ):
-            raise self.error("noise", given, "names with numbers are due")
+            raise self.error("noise", given, "names with numbers are expected")
         self._only(given, set(vars(Noise())), "noise")
         return Noise(**{name: float(value) for name, value in given.items()})
 
@@ -105,5 +105,5 @@ class _Calibration(Named):
             raise ForeignFileError(
                 self.path,
                 f"{where} has the unknown name {', '.join(unknown)}",
-                due=f"known are: {', '.join(sorted(known))}",
+                expected=f"known are: {', '.join(sorted(known))}",
             )

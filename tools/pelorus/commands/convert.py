@@ -101,7 +101,7 @@ def klt(
 
 
 def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option for each small sensor's file, which it gets by name."""
+    """Returns the command with an option for each small sensor's file, which it gets by name."""
     options = [
         inspect.Parameter(
             sensor.name,
@@ -131,7 +131,7 @@ def csv(
     stereo: Path | None = typer.Option(
         None,
         help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame. "
-        "Without it another sensor is due, such as --position.",
+        "Without it another sensor is expected, such as --position.",
     ),
     calibration: list[Path] = typer.Option(
         [],

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import typer
-from rich.markup import escape
 
-from pelorus.console import out, step, steps
+from pelorus.commands.another import run_command
+from pelorus.console import step, steps
 from pelorus.errors import Existing, PelorusError, made, resolved
 
 STEPS_OF_CHECK, STEPS_OF_REPORT = 5, 3  # theirs load slowly
@@ -21,12 +21,12 @@ app = typer.Typer()
 
 
 def _has(*names: str) -> Callable[[Path], bool]:
-    """Whether a folder holds one of them."""
+    """Returns a test whether a folder holds one of these names."""
     return lambda source: source.is_dir() and any((source / name).exists() for name in names)
 
 
 def _archive_with(name: str) -> Callable[[Path], bool]:
-    """Whether a .npz holds this array."""
+    """Returns a test whether a .npz holds this array."""
 
     def holds(source: Path) -> bool:
         if source.suffix != ".npz" or not zipfile.is_zipfile(source):
@@ -37,7 +37,7 @@ def _archive_with(name: str) -> Callable[[Path], bool]:
     return holds
 
 
-# What a source is, by what is in it, and what `pelorus convert` calls it. The first counts.
+# Formats of `pelorus convert`, each with a test of the content. The first that holds counts.
 FORMATS: tuple[tuple[str, str, Callable[[Path], bool]], ...] = (
     ("ros", f"a bag ({', '.join(BAGS)})", lambda source: source.suffix in BAGS),
     ("ros", "a bag's folder (metadata.yaml)", _has("metadata.yaml")),
@@ -49,7 +49,7 @@ FORMATS: tuple[tuple[str, str, Callable[[Path], bool]], ...] = (
 
 
 def _format_of(source: Path) -> str:
-    """What `pelorus convert` calls it; empty for a recording."""
+    """Returns the format's name in `pelorus convert`; empty for a recording."""
     if source.is_file() and source.name.endswith(RECORDINGS):
         return ""
     for name, _, fits in FORMATS:
@@ -62,15 +62,6 @@ def _format_of(source: Path) -> str:
         f"{source}: is nothing that is known by its looks: a recording (.plr), {known}. For other "
         "data pelorus convert has a command for each format: docs/CONVERT.md"
     )
-
-
-def _run(*words: str) -> int:
-    """Another command, as the user could give it; its exit status."""
-    from pelorus.application import application  # noqa: PLC0415 - it imports the commands
-
-    out.print(f"[bold]$ pelorus {escape(' '.join(words))}[/]")
-    status = application(words[:1])(args=list(words), standalone_mode=False)
-    return status if isinstance(status, int) else 0
 
 
 @app.command(
@@ -105,17 +96,17 @@ def first_try(
 def _all(
     source: Path, kind: str, name: str, into: Path, own: list[str], force: tuple[str, ...]
 ) -> int:
-    """The exit status."""
+    """Returns the exit status."""
     recording = source
     if kind:
         step("converting")
         recording = into / f"{name}.plr"
-        if status := _run("convert", kind, str(source), str(recording), *own, *force):
+        if status := run_command("convert", kind, str(source), str(recording), *own, *force):
             return status
     elif own:
         raise PelorusError(f"{' '.join(own)}: {source} needs no conversion")
     tuned = into / "tuned.conf"
-    status = _run("check", str(recording), "--out", str(tuned), *force)
+    status = run_command("check", str(recording), "--out", str(tuned), *force)
     settings = ("--config", str(tuned)) if status == 0 and tuned.is_file() else ()
-    _run("report", str(recording), "--out", str(into), *settings, *force)
+    run_command("report", str(recording), "--out", str(into), *settings, *force)
     return status

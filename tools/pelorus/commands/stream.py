@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import signal
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -16,14 +16,15 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from pelorus import packed_file
 from pelorus.commands.choices import PROGRAMS
 from pelorus.commands.compare import compare_log
+from pelorus.commands.watching import VIEW, watching
 from pelorus.console import err, one_line, out
-from pelorus.errors import Existing, PelorusError, writing
-from pelorus.flight.judge import Verdict
+from pelorus.errors import PelorusError, writing
+from pelorus.flight.judge import BitsVerdict
 from pelorus.frames import Kind, Message, Pose
 from pelorus.robot.emulator import MACHINES
 from pelorus.robot.state import restored, saved
 from pelorus.robot.status import refusal
-from pelorus.robot.stream import ANSWER_S, Outcome, Streamer
+from pelorus.robot.stream import ANSWER_S, Streamer, StreamResult
 from pelorus.robot.target import BAUD, FORMS, open_target
 from pelorus.wire import header_of, read_file
 
@@ -47,13 +48,7 @@ def stream(
         help="Keep what both sides said, as a recording: replayed, it gives the robot's bits. Cut "
         "short, it is whole up to there; as OUT.plr.zst up to the last 32 KB.",
     ),
-    view: str | None = typer.Option(
-        None,
-        "--view",
-        metavar="spawn|URL|OUT.rrd",
-        help="Show it in Rerun while it runs: in a viewer that is started, one that runs already, "
-        "or a file; as pelorus view does of a log.",
-    ),
+    view: str | None = VIEW,
     compare: bool = typer.Option(
         False,
         "--compare",
@@ -105,7 +100,7 @@ def stream(
     if record is not None and record.exists() and record.samefile(source):
         raise PelorusError(f"{record}: is the recording to send; --record needs another file")
     streamer: Streamer | None = None
-    verdict = Verdict.SAME
+    verdict = BitsVerdict.SAME
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         log_path = record or (Path(folder) / "flight.plr" if compare else None)
         try:
@@ -113,7 +108,7 @@ def stream(
                 _ended_in_order(),
                 open_target(to, image) as link,
                 _log_file(log_path) as log,
-                _viewer(view) as watch,
+                watching(view) as watch,
                 _display(messages) as show,
             ):
                 streamer = Streamer(link, log, show, answer, watch)
@@ -131,12 +126,12 @@ def stream(
         raise PelorusError(f"{to}: {outcome.state_trouble}")
     if not outcome.poses:
         raise PelorusError(f"{to}: took {outcome.frames} frames and gave no pose")
-    if verdict is not Verdict.SAME:
+    if verdict is not BitsVerdict.SAME:
         raise typer.Exit(verdict)
 
 
 def _first_frames(messages: list[Message], frames: int | None) -> list[Message]:
-    """The recording up to and with its n-th stereo frame."""
+    """Returns the recording up to and with its n-th stereo frame."""
     stereos = [at for at, message in enumerate(messages) if message.kind == Kind.STEREO]
     if frames is None or frames >= len(stereos):
         return messages
@@ -147,13 +142,13 @@ def _stereos(messages: list[Message]) -> int:
     return sum(message.kind == Kind.STEREO for message in messages)
 
 
-def _how_far(outcome: Outcome, messages: list[Message]) -> str:
+def _how_far(outcome: StreamResult, messages: list[Message]) -> str:
     return f"after {outcome.frames} of {_stereos(messages)} frames"
 
 
 @contextmanager
 def _ended_in_order() -> Iterator[None]:
-    """A request to terminate ends the drive as Ctrl-C does: with it goes the emulator."""
+    """Ends the drive at a request to terminate as at Ctrl-C, which also ends the emulator."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -173,25 +168,6 @@ def _log_file(path: Path | None) -> Iterator[BinaryIO | None]:
     finally:
         with suppress(OSError):  # what could not be written has been told
             stream.close()
-
-
-@contextmanager
-def _viewer(where: str | None) -> Iterator[Callable[[Message], None]]:
-    if where is None:
-        yield lambda _: None
-        return
-    from pelorus.view.drive import Drive  # noqa: PLC0415 - scipy loads slowly
-    from pelorus.view.in_rerun import InRerun  # noqa: PLC0415
-
-    file = Path(where) if where.endswith(".rrd") else None
-    if file is not None:
-        Existing.keep(file)
-    spawn = where == "spawn"
-    drive = Drive([InRerun(file, None if spawn or file else where, spawn)])
-    try:
-        yield drive.take
-    finally:
-        drive.end()
 
 
 class _Display:
@@ -224,13 +200,13 @@ def _display(messages: list[Message]) -> Iterator[_Display]:
         yield _Display(progress, _stereos(messages))
 
 
-def _tell(outcome: Outcome, record: Path | None) -> None:
-    """A line for each thing, never cut: a board's own words and a path may be long."""
+def _tell(outcome: StreamResult, record: Path | None) -> None:
+    """Prints a line for each thing, never cut: a board's own words and a path may be long."""
     for name, words in _summary(outcome, record):
         out.print(f"{name:<8}  {words}", markup=False)
 
 
-def _summary(outcome: Outcome, record: Path | None) -> Iterator[tuple[str, str]]:
+def _summary(outcome: StreamResult, record: Path | None) -> Iterator[tuple[str, str]]:
     for remark in outcome.texts[:TEXTS_SHOWN]:
         yield "board", one_line(remark.text)
     if len(outcome.texts) > TEXTS_SHOWN:

@@ -55,7 +55,7 @@ def view(
     files = [path for path in (rrd, mcap) if path is not None]
     for path in files:
         if path.exists() and source.exists() and path.samefile(source):
-            raise PelorusError(f"{path}: is the log itself; another name is due")
+            raise PelorusError(f"{path}: is the log itself; another name is expected")
     if layout_file is not None:
         write_text(layout_file, layout())
         files.append(layout_file)

@@ -7,6 +7,7 @@ Every message is packed before it is used, and the filter is given what comes ou
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -114,9 +115,17 @@ class Setup:
 
 
 class Drive:
-    """A filter from its start to its end. `refused` counts, by status and kind, what it refused."""
+    """A filter from its start to its end. `refused` counts, by status and kind, what it refused;
+    `watch` is given all that a log holds.
+    """
 
-    def __init__(self, setup: Setup, start: Start | None = None, log: Path | None = None) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        start: Start | None = None,
+        log: Path | None = None,
+        watch: Callable[[Message], None] | None = None,
+    ) -> None:
         library_ = library(setup.precision)
         asked: dict[int, float] = {}
         for name, value in setup.settings.items():
@@ -127,6 +136,7 @@ class Drive:
         self.filter = Filter.of_recording(wanted, precision=setup.precision)
         self.refused: dict[tuple[Kind, int], int] = {}
         self.log = None if log is None else Log(log)
+        self._watch = watch
         self._start = None if start is None else Start.unpack(start.pack())
         self._library, self._resets = library_, 0
         self._write(*wanted, *([] if self._start is None else [self._start]))
@@ -188,6 +198,11 @@ class Drive:
         self.filter.set_pose(start.t_ns, start.R_WB, start.p_WB_m, P)
         self._resets = self._all_resets()
 
+    @property
+    def reset_count(self) -> int:
+        """Returns how often the pose may have jumped: enlargements of the covariance."""
+        return self._all_resets() - self._resets
+
     def _all_resets(self) -> int:
         totals = self.filter.totals()
         return totals["resets"] + totals["widened"]
@@ -217,9 +232,12 @@ class Drive:
     def _write(self, *messages: Message) -> None:
         if self.log is not None:
             self.log.write(*messages)
+        if self._watch is not None:
+            for message in messages:
+                self._watch(message)
 
     def _answered(self, frame: Stereo, report: FrameReport) -> Estimate:
-        if self.log is not None:
+        if self.log is not None or self._watch is not None:
             self._write(self._pose_message(), self._report_message(frame, report))
         return self.estimate(report)
 
@@ -246,7 +264,7 @@ class Drive:
         u, (bias, P_b) = f.velocity(), f.bias()
         return Pose(
             f.time_ns, p, R, pack_symmetric(P), u[:3], u[3:], bias, pack_symmetric(U),
-            self._library.sizes.real // 8, True, self._all_resets() - self._resets, f.trace(),
+            self._library.sizes.real // 8, True, self.reset_count, f.trace(),
             np.diag(P_b).copy(),
         )  # fmt: skip
 

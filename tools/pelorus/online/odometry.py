@@ -13,7 +13,7 @@ the last pose with a covariance for the time that is not known.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +23,7 @@ import numpy as np
 from pelorus import packed_file, se3
 from pelorus.errors import PelorusError
 from pelorus.filter import FilterError
-from pelorus.frames import Process, Start, StartFlag, Stereo
+from pelorus.frames import Message, Process, Start, StartFlag, Stereo
 from pelorus.layout import Floats, pack_symmetric
 from pelorus.online.drive import LOST, UNKNOWN_COVARIANCE, Drive, Estimate, Setup
 from pelorus.online.order import ClockStep, Datum, Sequencer
@@ -43,9 +43,17 @@ def adjoint(T: Poses) -> Floats:
     return Ad
 
 
+def turned(R: Floats, P: Floats) -> Floats:
+    """Returns diag(R, R) P diag(R, R)^T: a covariance (6, 6) of (rho, theta) in the axes of a body
+    with attitude R, as that of position and rotation about the fixed axes (the order of ROS)."""
+    both = np.kron(np.eye(2), R)
+    return np.asarray(both @ P @ both.T)
+
+
 class Odom(NamedTuple):
     """The base in the frame `odom`: pose, covariance of (rho, theta) in the base's axes; its
-    velocity (v, w) in its own axes with a covariance; of what it comes."""
+    velocity (v, w) in its own axes with a covariance; of what it comes; how often the pose may have
+    jumped."""
 
     t_ns: int
     T_OB: Poses
@@ -53,6 +61,7 @@ class Odom(NamedTuple):
     velocity: Floats
     velocity_covariance: Floats
     estimate: Estimate
+    reset_count: int
 
 
 @dataclass(frozen=True)
@@ -64,7 +73,8 @@ class Given:
 
 
 class Odometry:
-    """`log` is the recording that is written; later drives of the same run get -2, -3 ..."""
+    """`log` is the recording that is written; later drives of the same run get -2, -3 ...; `watch`
+    is given all that stands in it."""
 
     def __init__(
         self,
@@ -72,8 +82,10 @@ class Odometry:
         T_IB: Poses = IDENTITY,
         log: Path | None = None,
         given: Given | None = None,
+        watch: Callable[[Message], None] | None = None,
     ) -> None:
-        self.setup, self.T_IB, self._log = setup, T_IB, log
+        self.setup, self.T_IB, self._log, self._watch = setup, T_IB, log, watch
+        self._jumps = 0  # of the drives before this one
         self.drives = 0
         self.origin: Poses | None = None  # T_OW
         self.drive: Drive | None = None
@@ -89,11 +101,11 @@ class Odometry:
 
     def add(self, datum: Datum) -> list[Odom]:
         """Returns what is known after each frame that this message lets go on."""
-        return [odom for due in self.sequencer.add(datum) for odom in self._use(due)]
+        return [odom for expected in self.sequencer.add(datum) for odom in self._use(expected)]
 
     def finish(self) -> list[Odom]:
         """Uses what still waits, and ends the log."""
-        rest = [odom for due in self.sequencer.flush() for odom in self._use(due)]
+        rest = [odom for expected in self.sequencer.flush() for odom in self._use(expected)]
         self._end()
         return rest
 
@@ -145,18 +157,18 @@ class Odometry:
 
     # --- drives
 
-    def _use(self, due: Datum | ClockStep) -> Iterator[Odom]:
-        if isinstance(due, ClockStep):
-            self._follow(due)
+    def _use(self, expected: Datum | ClockStep) -> Iterator[Odom]:
+        if isinstance(expected, ClockStep):
+            self._follow(expected)
             return
         if self.drive is None:
-            start = None if self._start is None else replace(self._start, t_ns=due.t_ns)
+            start = None if self._start is None else replace(self._start, t_ns=expected.t_ns)
             self.drive, self._start = self._new_drive(start), None
         if self._resume is not None:
             moved, self._resume = self._resume, None
-            self._go_on(self.drive, due.t_ns, moved)
-        estimate = self.drive.use(due)
-        if estimate is None and not isinstance(due, Stereo) and self._is_silent(due.t_ns):
+            self._go_on(self.drive, expected.t_ns, moved)
+        estimate = self.drive.use(expected)
+        if estimate is None and not isinstance(expected, Stereo) and self._is_silent(expected.t_ns):
             estimate = self.drive.estimate()
         if estimate is not None and estimate.started:
             self._told_ns = estimate.t_ns
@@ -180,7 +192,8 @@ class Odometry:
         Ad = adjoint(se3.inverse(self.T_IB))
         P, U = (Ad @ C @ Ad.T for C in (estimate.covariance, estimate.velocity_covariance))
         T_OB = se3.compose(self.origin, T_WB)
-        return Odom(estimate.t_ns, T_OB, P, Ad @ estimate.velocity, U, estimate)
+        jumps = self._jumps + (self.drive.reset_count if self.drive is not None else 0)
+        return Odom(estimate.t_ns, T_OB, P, Ad @ estimate.velocity, U, estimate, jumps)
 
     def _new_drive(self, start: Start | None) -> Drive:
         self.drives += 1
@@ -190,10 +203,11 @@ class Odometry:
                 path.suffixes[-2:] if packed_file.is_packed(path) else path.suffixes[-1:]
             )
             path = path.with_name(f"{packed_file.bare_name(path)}-{self.drives}{suffix}")
-        return Drive(self.setup, start, path)
+        return Drive(self.setup, start, path, self._watch)
 
     def _end(self) -> None:
         if self.drive is not None:
+            self._jumps += self.drive.reset_count + 1
             self.drive.close()
         self.drive, self._told_ns = None, -1
 

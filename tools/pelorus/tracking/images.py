@@ -46,7 +46,9 @@ def pairs(left: Path, right: Path, remarks: list[str] | None = None) -> list[Pai
     partner, and that is said: for names that are times, so that the others keep theirs.
     """
     if resolved(left) == resolved(right):
-        raise PelorusError(f"{left}: is given as the left and as the right folder; two are due")
+        raise PelorusError(
+            f"{left}: is given as the left and as the right folder; two are expected"
+        )
     lefts, rights = pictures(left), pictures(right)
     alone = lefts.keys() ^ rights.keys()
     if remarks is None or too_many_alone(len(lefts.keys() & rights.keys()), len(alone)):
@@ -57,7 +59,7 @@ def pairs(left: Path, right: Path, remarks: list[str] | None = None) -> list[Pai
         lefts = {name: path for name, path in lefts.items() if name in rights}
     if len(lefts) < PAIRS_MIN:
         raise PelorusError(
-            f"{left}: has {len(lefts)} pictures; at least {PAIRS_MIN} are due, for a track is "
+            f"{left}: has {len(lefts)} pictures; at least {PAIRS_MIN} are expected, for a track is "
             f"admitted after {PAIRS_MIN} frames"
         )
     return [Pair(lefts[name], rights[name]) for name in _in_order(lefts)]
@@ -77,7 +79,7 @@ def pictures(folder: Path) -> dict[str, Path]:
     except OSError as error:
         raise PelorusError(
             f"{folder}: cannot be read as a folder: {error.strerror}; a folder of pictures "
-            f"({', '.join(SUFFIXES)}) is due"
+            f"({', '.join(SUFFIXES)}) is expected"
         ) from error
     if not files:
         raise PelorusError(f"{folder}: holds no picture; {', '.join(SUFFIXES)} are known")
@@ -85,7 +87,8 @@ def pictures(folder: Path) -> dict[str, Path]:
     for path in files:
         if path.stem in found:
             raise PelorusError(
-                f"{path}: the folder has {found[path.stem].name} too; one picture a name is due"
+                f"{path}: the folder has {found[path.stem].name} too; one picture a name is "
+                "expected"
             )
         found[path.stem] = path
     return found
@@ -140,7 +143,7 @@ def times(found: list[Pair], file: Path | None, rate_hz: float | None) -> Times:
     if rate_hz is not None:
         if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
             raise PelorusError(
-                f"a rate of {rate_hz:g} Hz: {RATES_HZ[0]:g} to {RATES_HZ[1]:g} is due"
+                f"a rate of {rate_hz:g} Hz: {RATES_HZ[0]:g} to {RATES_HZ[1]:g} is expected"
             )
         return np.round(np.arange(len(found)) * 1e9 / rate_hz).astype(np.int64)
     stems = [pair.left.stem for pair in found]
@@ -148,10 +151,13 @@ def times(found: list[Pair], file: Path | None, rate_hz: float | None) -> Times:
         if not (stem.isdecimal() and NS_DIGITS[0] <= len(stem) <= NS_DIGITS[1]):
             raise PelorusError(
                 f"{found[0].left.parent}: the name {stem} is no time in ns: when were the pictures "
-                "taken? --times FILE (a time in s a row) or --rate HZ is due, on the twists' clock"
+                "taken? --times FILE (a time in s a row) or --rate HZ is expected, on the "
+                "twists' clock"
             )
     if int(stems[-1]) >= 2**63:
-        raise PelorusError(f"{found[-1].left}: the name is no time: at most {2**63 - 1} ns is due")
+        raise PelorusError(
+            f"{found[-1].left}: the name is no time: at most {2**63 - 1} ns is expected"
+        )
     t_ns = np.array([int(stem) for stem in stems], np.int64)
     if (np.diff(t_ns) <= 0).any():
         raise PelorusError(f"{found[0].left.parent}: two names are the same time in ns")
@@ -162,7 +168,9 @@ def _times_in(file: Path, count: int) -> Times:
     seconds = foreign.numbers(file, foreign.rows(file), 1)[:, 0]
     if len(seconds) != count:
         raise ForeignFileError(
-            file, f"has {len(seconds)} times", due=f"{count} are due, one for each pair of pictures"
+            file,
+            f"has {len(seconds)} times",
+            expected=f"{count} are expected, one for each pair of pictures",
         )
     return arrays.nanoseconds(file, "time", seconds)
 
@@ -200,10 +208,10 @@ def bits_up_to(brightest: int, where: Path, remarks: list[str]) -> int:
 def read(pair: Pair, shape: tuple[int, ...] | None = None, bits: int = 16) -> tuple[Gray, Gray]:
     """Left and right, both of this shape (rows, columns), else of equal shape."""
     left = gray(pair.left, bits)
-    due = left.shape if shape is None else shape
-    _require_shape(pair.left, left, due, "the first picture has")
+    expected = left.shape if shape is None else shape
+    _require_shape(pair.left, left, expected, "the first picture has")
     right = gray(pair.right, bits)
-    _require_shape(pair.right, right, due, "the left ones have")
+    _require_shape(pair.right, right, expected, "the left ones have")
     return left, right
 
 
@@ -216,10 +224,12 @@ def in_order(found: Iterable[Pair], bits: int = 16) -> Iterator[tuple[Gray, Gray
         yield left, right
 
 
-def _require_shape(path: Path, image: Gray, due: tuple[int, ...], who: str) -> None:
-    if image.shape != due:
+def _require_shape(path: Path, image: Gray, expected: tuple[int, ...], who: str) -> None:
+    if image.shape != expected:
         raise ForeignFileError(
-            path, f"has {_size(image.shape)} pixels", due=f"{_size(due)} are due, which {who}"
+            path,
+            f"has {_size(image.shape)} pixels",
+            expected=f"{_size(expected)} are expected, which {who}",
         )
 
 
@@ -235,7 +245,7 @@ def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> 
         raise ForeignFileError(
             path,
             f"the pictures have {_size(shape)} pixels",
-            due=f"{known[0]} x {known[1]} are due, for which the calibration was made",
+            expected=f"{known[0]} x {known[1]} are expected, for which the calibration was made",
         )
 
 
@@ -244,7 +254,7 @@ def _require_side(path: Path, shape: tuple[int, ...]) -> None:
         raise ForeignFileError(
             path,
             f"has {_size(shape)} pixels",
-            due=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are due",
+            expected=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are expected",
         )
 
 
@@ -277,7 +287,9 @@ def unpacked(path: Path, packed: bytes) -> NDArray[np.integer[Any]]:
         pixels = np.asarray(image if wide else image.convert("L"))
     except Exception as error:  # its decoders raise a dozen kinds on damaged files
         raise ForeignFileError(
-            path, f"cannot be read as a picture: {error}", due="a whole PNG, JPEG or PGM is due"
+            path,
+            f"cannot be read as a picture: {error}",
+            expected="a whole PNG, JPEG or PGM is expected",
         ) from error
     _require_side(path, pixels.shape)
     return pixels

@@ -33,6 +33,6 @@ class Settings:
             ("largest disparity", self.disparity_max_px, 0, 10_000),
         ):
             if not least <= value <= most:
-                raise PelorusError(f"{name} {value}: {least} to {most} is due")
+                raise PelorusError(f"{name} {value}: {least} to {most} is expected")
         if self.window_px % 2 == 0:
-            raise PelorusError(f"window {self.window_px}: an odd number is due")
+            raise PelorusError(f"window {self.window_px}: an odd number is expected")

@@ -137,6 +137,6 @@ def track(
     if not len(tracks):
         raise PelorusError(
             f"{where[0]}: no corner could be followed for {ADMITTED_AFTER} frames; pictures with "
-            "texture that overlap from frame to frame are due"
+            "texture that overlap from frame to frame are expected"
         )
     return tracks

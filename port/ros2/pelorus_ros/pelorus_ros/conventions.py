@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.layout import Floats
+from pelorus.online.odometry import turned
 from pelorus.se3 import Poses
 from scipy.spatial.transform import Rotation
 
@@ -23,12 +24,6 @@ LANDMARK = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("id", "<u4"),
      *((f"cov_{name}", "<f4") for name in ("xx", "xy", "xz", "yy", "yz", "zz"))]
 )  # fmt: skip
-
-
-def turned(R: Floats, P: Floats) -> Floats:
-    """Returns diag(R, R) P diag(R, R)^T, of a (6, 6) in blocks."""
-    both = np.kron(np.eye(2), R)
-    return np.asarray(both @ P @ both.T)
 
 
 def to_ros(R: Floats, P: Floats) -> Floats:

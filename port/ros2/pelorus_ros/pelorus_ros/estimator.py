@@ -7,7 +7,7 @@ A message is anything with the fields of its type. What cannot be used is counte
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,25 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pelorus import schema
 from pelorus.converters import ros_frames
-from pelorus.converters.streams import FORCES_MPS2
 from pelorus.errors import PelorusError, write_text
-from pelorus.frames import Imu, Reading, Stereo, Twist
-from pelorus.inertial import Inertial
+from pelorus.frames import Imu, Reading, Twist
 from pelorus.layout import Floats
+from pelorus.online import diagnosis
+from pelorus.online.diagnosis import Status
 from pelorus.online.drive import Setup
-from pelorus.online.eyes import Eyes, Seen, open_eyes, require_size
+from pelorus.online.eyes import Seen
 from pelorus.online.odometry import Given, Odom, Odometry
-from pelorus.online.order import Datum
-from pelorus.online.pairs import Joining, Pairing
+from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline
 
 from pelorus_ros import conventions, status
 from pelorus_ros.mounting import NoChain, bare
 from pelorus_ros.parameters import Options
 from pelorus_ros.rigging import SIDES, NotYet, Rigged, Rigging
-
-WINDOW = 50  # readings by whose median the unit is judged
-WINDOWS_ENOUGH = 4
-G_MPS2 = 9.80665
 
 
 def stamp_ns(header: Any) -> int:
@@ -55,32 +50,30 @@ class Wheels:
 
 
 class Estimator:
-    """Everything between messages and odometry. `blocked` says why nothing is told although data
-    come: what was found cannot be right.
+    """Everything between messages and odometry: the pipeline, once calibration and frames are
+    known.
     """
 
     def __init__(self, options: Options) -> None:
         self.options = options
         self.rigging = Rigging(options)
-        self.odometry: Odometry | None = None
-        self.blocked: dict[str, str] = {}
+        within_ns = round(options.sync_matching_threshold_ms * 1e6)
+        self.pipeline = Pipeline(within_ns, f"set the parameter accel_scale to {G_MPS2:g}")
         self.waits_for = "for the first data"
         self.counts: Counter[str] = Counter()  # messages used, by topic; what was left out
-        self.last: Odom | None = None
         self.faults: dict[str, str] = {}  # of messages that could not be read, by topic
-        self._given: Given | None = self._initial()
-        self._before: Counter[str] = Counter()
-        self._begin()
-
-    def _begin(self) -> None:
-        within = round(self.options.sync_matching_threshold_ms * 1e6)
-        self.pairing: Pairing[Any] = Pairing(within)
-        self._joining = Joining()
-        self._forces: deque[float] = deque(maxlen=WINDOW)
-        self._windows = 0
-        self._eyes: Eyes | None = None
         self.rigged: Rigged | None = None
         self._size: tuple[int, int] = (0, 0)
+        self._given: Given | None = self._initial()
+        self._before: Counter[str] = Counter()
+
+    @property
+    def odometry(self) -> Odometry | None:
+        return self.pipeline.odometry
+
+    @property
+    def blocked(self) -> dict[str, str]:
+        return self.pipeline.blocked
 
     # --- what comes
 
@@ -98,7 +91,7 @@ class Estimator:
         """
         self.counts[f"{side}/image"] += 1
         self.rigging.heard(side, message.header.frame_id)
-        pair = self.pairing.add(side == "right", stamp_ns(message.header), message)
+        pair = self.pipeline.pairing.add(side == "right", stamp_ns(message.header), message)
         if pair is None:
             return []
         if too_slow:
@@ -124,12 +117,12 @@ class Estimator:
         self.counts["gyro"] += 1
         self.rigging.heard("imu", message.header.frame_id)
         w = _row(message.angular_velocity)[0]
-        return self._inertial(self._joining.rate(stamp_ns(message.header), w))
+        return self._inertial(self.pipeline.joining.rate(stamp_ns(message.header), w))
 
     def accel(self, message: Any) -> list[Odom]:
         self.counts["accel"] += 1
         a = _row(message.linear_acceleration)[0]
-        return self._inertial(self._joining.force(stamp_ns(message.header), a))
+        return self._inertial(self.pipeline.joining.force(stamp_ns(message.header), a))
 
     def wheels(self, message: Any) -> list[Odom]:
         """An Odometry, or a TwistWithCovarianceStamped."""
@@ -145,7 +138,7 @@ class Estimator:
         if self.options.motion == "wheels":
             if not self._ready():
                 return []
-            return self._add(Twist(read.t_ns, read.v_mps, read.w_radps))
+            return self.pipeline.add(Twist(read.t_ns, read.v_mps, read.w_radps))
         return self._guarded("wheels", lambda: self._beside(read))
 
     def initial_pose(self, message: Any) -> list[Odom]:
@@ -168,8 +161,8 @@ class Estimator:
         if self.odometry is not None:
             self.odometry.finish()
             self.odometry.restart()
-        self.blocked, self.last = {}, None
-        self._begin()
+        self.pipeline.last, self.rigged, self._size = None, None, (0, 0)
+        self.pipeline.begin()
 
     def save_state(self) -> str:
         file = self._state_file()
@@ -193,7 +186,7 @@ class Estimator:
 
     def finish(self) -> list[Odom]:
         """The rest of what waits, and the end of the log."""
-        return self.odometry.finish() if self.odometry is not None else []
+        return self.pipeline.finish()
 
     def _state_file(self) -> Path:
         if not self.options.state_file:
@@ -208,20 +201,11 @@ class Estimator:
             for side, m in zip(SIDES, (left, right), strict=True)
         ]
         self._size = pictures[0].shape[1], pictures[0].shape[0]
-        if not self._ready() or self.rigged is None or "cameras" in self.blocked:
+        if not self._ready() or self.rigged is None or CAMERAS in self.blocked:
             return []
         if self.rigged.swapped:
             pictures.reverse()
-        header, rig = self.rigged.calibrated.header, self.rigged.calibrated.rig
-        require_size(pictures[0], pictures[1], header.image_width_px, header.image_height_px)
-        if self._eyes is None:
-            self._eyes = open_eyes(None if rig is None else rig.rectification())
-        try:
-            seen = self._eyes.see(*pictures)
-        except PelorusError as error:
-            self.blocked["cameras"] = str(error)
-            return []
-        return self._frame(t_ns, seen)
+        return self.pipeline.pictures(t_ns, pictures[0], pictures[1])
 
     def _told(self, message: Any) -> list[Odom]:
         if not self._ready() or self.rigged is None:
@@ -239,21 +223,9 @@ class Estimator:
         if rig is not None:
             pixels = rig.rectification().pixels(pixels)
         good = np.isfinite(pixels).all(axis=1)
-        return self._frame(
+        return self.pipeline.seen(
             stamp_ns(message.header), Seen(ids[good], pixels[good].astype(np.float32))
         )
-
-    def _frame(self, t_ns: int, seen: Seen) -> list[Odom]:
-        rig = None if self.rigged is None else self.rigged.calibrated.rig
-        offset_ns = 0 if rig is None else round(rig.offset_s * 1e9)
-        disparity = seen.pixels[:, 0] - seen.pixels[:, 2]
-        if len(disparity) > WINDOW // 5 and float(np.median(disparity)) < 0:
-            self.blocked["cameras"] = (
-                "most points lie further right in the right picture than in the left one: are left "
-                "and right swapped?"
-            )
-            return []
-        return self._add(Stereo(t_ns + offset_ns, seen.ids, seen.pixels))
 
     # --- motion
 
@@ -261,33 +233,11 @@ class Estimator:
         told = []
         for one in readings:
             a, w = one.a_B_mps2 * self.options.accel_scale, one.w_B_radps * self.options.gyro_scale
-            self._judge_unit(float(np.linalg.norm(a)))
-            if not self._ready() or self.rigged is None:
-                continue
-            right = self.rigged.calibrated.imu.correction.of(Inertial(np.array([one.t_ns]), a, w))
-            told += self._add(Imu(one.t_ns, right.a_B_mps2, right.w_B_radps))
+            scaled = Imu(one.t_ns, a, w)
+            self.pipeline.judge(scaled)
+            if self._ready():
+                told += self.pipeline.inertial([scaled])
         return told
-
-    def _judge_unit(self, force: float) -> None:
-        """At the beginning: half a second at a time, until four in a row are right."""
-        if self._windows >= WINDOWS_ENOUGH:
-            return
-        self._forces.append(force)
-        if len(self._forces) < WINDOW:
-            return
-        usual = float(np.median(self._forces))
-        self._forces.clear()
-        if FORCES_MPS2[0] <= usual <= FORCES_MPS2[1]:
-            self._windows += 1
-            self.blocked.pop("imu", None)
-            return
-        self._windows = 0
-        hint = "has gravity been taken away (a filtered topic)? raw readings are wanted"
-        if FORCES_MPS2[0] <= usual * G_MPS2 <= FORCES_MPS2[1]:
-            hint = f"that is g: set the parameter accel_scale to {G_MPS2:g}"
-        self.blocked["imu"] = (
-            f"the specific force is {usual:.3g} m/s^2 in the median, not 9.81: {hint}"
-        )
 
     def _beside(self, read: Wheels) -> list[Odom]:
         """Wheels beside an IMU: their velocity in the IMU's axes, at the place of their frame."""
@@ -298,7 +248,7 @@ class Estimator:
         sigma = np.where(read.sigma > 0, read.sigma, given)
         inside = np.sqrt(np.diag(T.R @ np.diag(sigma**2) @ T.R.T))
         number = schema.SENSORS["wheel"]
-        return self._add(Reading(read.t_ns, number, 7, T.R @ read.v_mps, inside, T.p))
+        return self.pipeline.add(Reading(read.t_ns, number, 7, T.R @ read.v_mps, inside, T.p))
 
     # --- what it takes to begin
 
@@ -316,11 +266,12 @@ class Estimator:
                     rigged.calibrated.header, options.filter_settings(), options.filter_precision
                 )
                 log = Path(options.log) if options.log else None
-                self.odometry = Odometry(setup, rigged.T_IB, log, self._given)
+                self.pipeline.odometry = Odometry(setup, rigged.T_IB, log, self._given)
         except (NotYet, NoChain, PelorusError) as missing:
             self.waits_for = str(missing)
             return False
         self.rigged, self.waits_for = rigged, ""
+        self.pipeline.calibrated = rigged.calibrated
         return True
 
     @property
@@ -345,15 +296,6 @@ class Estimator:
         return []
 
     # --- out
-
-    def _add(self, datum: Datum) -> list[Odom]:
-        assert self.odometry is not None
-        told = self.odometry.add(datum)
-        if self.blocked:
-            return []
-        if told:
-            self.last = told[-1]
-        return told
 
     def _guarded(self, topic: str, work: Callable[[], list[Odom]]) -> list[Odom]:
         """A message that cannot be used is told, and the next one is taken."""
@@ -380,18 +322,19 @@ class Estimator:
         beside = ["wheels"] if self.options.wheels_beside_imu else []
         return [*eyes, *motion[self.options.motion], *beside]
 
-    def diagnose(self) -> list[status.Status]:
+    def _messages(self) -> int:
+        return sum(self.counts[topic] for topic in self.topics())
+
+    def diagnose(self) -> list[Status]:
         """Returns what there is to say since the last call, a second ago as a rule."""
         fresh, self._before = self.counts - self._before, self.counts.copy()
         faults, self.faults = self.faults, {}
         return [
             status.of_setup(self.blocked, self.waits_for),
             *status.of_inputs(self.topics(), fresh, self.counts, faults),
-            *status.of_pairs(self.pairing, self.options.sync_matching_threshold_ms),
-            *status.of_speed(fresh["too slow"]),
-            *status.of_odometry(
-                self.odometry, self.last, sum(self.counts[t] for t in self.topics())
-            ),
+            *diagnosis.of_pairs(self.pipeline.pairing),
+            *diagnosis.of_speed(fresh["too slow"]),
+            *diagnosis.of_odometry(self.odometry, self.pipeline.last, self._messages()),
         ]
 
 

@@ -25,6 +25,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformS
 from nav_msgs.msg import Odometry as OdometryMessage
 from nav_msgs.msg import Path as PathMessage
 from pelorus.errors import PelorusError
+from pelorus.online.diagnosis import Level, Status
 from pelorus.online.odometry import Odom
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
@@ -41,7 +42,6 @@ from pelorus_ros import conventions
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options, misspelt, table
 from pelorus_ros.rigging import SIDES
-from pelorus_ros.status import Level, Status
 
 PICTURES_KEPT, READINGS_KEPT = 30, 1000  # of a topic, by the middleware
 LATENCIES_KEPT = 600

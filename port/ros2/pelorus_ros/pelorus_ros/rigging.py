@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pelorus import se3
 from pelorus.errors import PelorusError
-from pelorus.frames import Process
+from pelorus.online.pipeline import header_of
 from pelorus.rig import read as rig_files
 from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.lens import LensModel
@@ -65,12 +65,7 @@ class Rigging:
         if rig is not None:
             calibrated = rig_files.of_rig(self._on_body(rig), "")
         assert calibrated is not None
-        header = calibrated.header
-        if self.options.motion != "wheels":
-            told = {name: s for name, s in vars(calibrated.imu.noise).items() if s >= 0}
-            header = replace(header, process=Process.IMU, noise=replace(header.noise, **told))
-        if size[0] and not header.image_width_px:
-            header = replace(header, image_width_px=size[0], image_height_px=size[1])
+        header = header_of(calibrated, self.options.motion != "wheels", size)
         swapped = rig is not None and rig.swapped and not self.options.files
         return Rigged(replace(calibrated, header=header), self._base_on_body(), swapped)
 

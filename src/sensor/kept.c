@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "sensor/measurement.h"
+#include "sensor/kept.h"
 
 #include <string.h>
 

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""From what sensors measure to odometry: pictures are paired and followed, readings corrected.
+
+The ROS 2 node and `pelorus live` are both made of it. It knows no camera, no message and no clock.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pelorus.converters.streams import FORCES_MPS2
+from pelorus.errors import PelorusError
+from pelorus.frames import Header, Imu, Process, Stereo
+from pelorus.inertial import Inertial
+from pelorus.online.eyes import Eyes, Seen, open_eyes, require_size
+from pelorus.online.odometry import Odom, Odometry
+from pelorus.online.order import Datum
+from pelorus.online.pairs import Joining, Pairing
+from pelorus.rig.read import Calibrated
+from pelorus.tracking.images import Gray
+
+WINDOW = 50  # readings by whose median the unit is judged
+WINDOWS_ENOUGH = 4
+POINTS_ENOUGH = 10  # to tell by their disparities that the cameras are swapped
+G_MPS2 = 9.80665
+CAMERAS, IMU = "cameras", "imu"
+
+
+def header_of(calibrated: Calibrated, inertial: bool, size: tuple[int, int] = (0, 0)) -> Header:
+    """Returns the HEADER of a drive: its process, the IMU's noise, and the pictures' size."""
+    header = calibrated.header
+    if inertial:
+        told = {name: s for name, s in vars(calibrated.imu.noise).items() if s >= 0}
+        header = replace(header, process=Process.IMU, noise=replace(header.noise, **told))
+    if size[0] and not header.image_width_px:
+        header = replace(header, image_width_px=size[0], image_height_px=size[1])
+    return header
+
+
+@dataclass
+class UnitCheck:
+    """Judges by the first readings whether an accelerometer tells m/s^2, gravity in it."""
+
+    remedy: str  # what to do where it tells g
+    _forces: deque[float] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    _right: int = 0  # windows in a row
+
+    def trouble(self, force_mps2: float) -> str | None:
+        """Returns what is wrong by the last window, "" if it is right; None within a window."""
+        if self._right >= WINDOWS_ENOUGH:
+            return None
+        self._forces.append(force_mps2)
+        if len(self._forces) < WINDOW:
+            return None
+        usual = float(np.median(self._forces))
+        self._forces.clear()
+        if FORCES_MPS2[0] <= usual <= FORCES_MPS2[1]:
+            self._right += 1
+            return ""
+        self._right = 0
+        hint = "has gravity been taken away (a filtered topic)? raw readings are wanted"
+        if FORCES_MPS2[0] <= usual * G_MPS2 <= FORCES_MPS2[1]:
+            hint = f"that is g: {self.remedy}"
+        return f"the specific force is {usual:.3g} m/s^2 in the median, not 9.81: {hint}"
+
+
+class Pipeline:
+    """`blocked` says why nothing is told although data come: what was found cannot be right."""
+
+    def __init__(self, within_ns: int, remedy_for_g: str) -> None:
+        """`within_ns`: pictures whose stamps differ by so much at most belong together."""
+        self.within_ns, self._remedy = within_ns, remedy_for_g
+        self.calibrated: Calibrated | None = None
+        self.odometry: Odometry | None = None
+        self.last: Odom | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """Forgets what the sensors have shown; the odometry goes on."""
+        self.blocked: dict[str, str] = {}
+        self.pairing: Pairing[Any] = Pairing(self.within_ns)
+        self.joining = Joining()
+        self._unit = UnitCheck(self._remedy)
+        self._eyes: Eyes | None = None
+
+    # --- cameras
+
+    def pictures(self, t_ns: int, left: Gray, right: Gray) -> list[Odom]:
+        """A pair, as the cameras took it."""
+        assert self.calibrated is not None
+        if CAMERAS in self.blocked:
+            return []
+        header, rig = self.calibrated.header, self.calibrated.rig
+        require_size(left, right, header.image_width_px, header.image_height_px)
+        if self._eyes is None:
+            self._eyes = open_eyes(None if rig is None else rig.rectification())
+        try:
+            seen = self._eyes.see(left, right)
+        except PelorusError as error:
+            self.blocked[CAMERAS] = str(error)
+            return []
+        return self.seen(t_ns, seen)
+
+    def seen(self, t_ns: int, seen: Seen) -> list[Odom]:
+        """Points of the rectified pair."""
+        assert self.calibrated is not None
+        rig = self.calibrated.rig
+        offset_ns = 0 if rig is None else round(rig.offset_s * 1e9)
+        disparity = seen.pixels[:, 0] - seen.pixels[:, 2]
+        if len(disparity) > POINTS_ENOUGH and float(np.median(disparity)) < 0:
+            self.blocked[CAMERAS] = (
+                "most points lie further right in the right picture than in the left one: are left "
+                "and right swapped?"
+            )
+            return []
+        return self.add(Stereo(t_ns + offset_ns, seen.ids, seen.pixels))
+
+    # --- motion
+
+    def judge(self, reading: Imu) -> None:
+        """Whether the accelerometer's unit is right; also before anything is calibrated."""
+        trouble = self._unit.trouble(float(np.linalg.norm(reading.a_B_mps2)))
+        if trouble:
+            self.blocked[IMU] = trouble
+        elif trouble is not None:
+            self.blocked.pop(IMU, None)
+
+    def inertial(self, readings: Iterable[Imu]) -> list[Odom]:
+        """Readings of one time each, as the IMU gave them."""
+        assert self.calibrated is not None
+        told = []
+        for one in readings:
+            raw = Inertial(np.array([one.t_ns]), one.a_B_mps2, one.w_B_radps)
+            right = self.calibrated.imu.correction.of(raw)
+            told += self.add(Imu(one.t_ns, right.a_B_mps2, right.w_B_radps))
+        return told
+
+    # --- the filter
+
+    def add(self, datum: Datum) -> list[Odom]:
+        """Anything that the filter takes as it is."""
+        assert self.odometry is not None
+        return self._told(self.odometry.add(datum))
+
+    def finish(self) -> list[Odom]:
+        """Uses what still waits, and ends the log."""
+        return [] if self.odometry is None else self._told(self.odometry.finish())
+
+    def _told(self, odoms: list[Odom]) -> list[Odom]:
+        if self.blocked:
+            return []
+        if odoms:
+            self.last = odoms[-1]
+        return odoms
