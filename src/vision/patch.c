@@ -8,6 +8,9 @@ enum { HALF = PLR_PATCH_SIDE / 2, KEPT_HALF = PLR_PATCH_KEPT / 2, FRACTION = 16,
 #define UNIT     PLR_R(65536)
 #define STEP_MAX PLR_R(2)    /* px */
 #define STEP_END PLR_R(0.02) /* px */
+/* Of a step, as the last two tell it. */
+#define SHARE_LEAST PLR_R(0.25)
+#define SHARE_MOST  PLR_R(2)
 /* Grey levels' noise that no residual may claim to be below: rounding to whole levels, twice. */
 #define GREY_VAR PLR_R(2.0 / 12 * PLR_GREY * PLR_GREY)
 /* What a patch that fits exactly is still off by: interpolation, aliasing, rounded weights; px^2. */
@@ -74,6 +77,21 @@ bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]) {
     const plr_real det = PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
     /* the smaller eigenvalue is at least det / trace */
     return t->TT > 0 && det > WEAKEST * (t->H[0] + t->H[2]);
+}
+
+void plr_template_centre(const plr_template *t, plr_real centre[2]) {
+    int32_t S = 0, xS = 0, yS = 0;
+    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++)
+        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++) {
+            /* J is a multiple of PLR_GREY / 2 */
+            const int32_t s = (t->Jx[k] * (i - HALF) + t->Jy[k] * (j - HALF)) / (PLR_GREY / 2);
+            S += s, xS += t->Jx[k] * s, yS += t->Jy[k] * s;
+        }
+    const plr_real x = PLR_GREY / 2 * central(xS, S, t->sum_Jx);
+    const plr_real y = PLR_GREY / 2 * central(yS, S, t->sum_Jy);
+    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
+    centre[0] = PLR_FMA(t->H[2], x, -(t->H[1] * y)) * by_det;
+    centre[1] = PLR_FMA(t->H[0], y, -(t->H[1] * x)) * by_det;
 }
 
 /* --- sums --- */
@@ -186,18 +204,28 @@ static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const 
     return true;
 }
 
+/* The share of a step d that ends the swing of the last one. */
+static plr_real share_of(const plr_real d[2], const plr_real last[2], plr_real share) {
+    const plr_real x = d[0] - last[0], y = d[1] - last[1], change = PLR_FMA(x, x, y * y);
+    if (change > 0)
+        share *= -PLR_FMA(last[0], x, last[1] * y) / change;
+    return share < SHARE_LEAST ? SHARE_LEAST : share < SHARE_MOST ? share : SHARE_MOST;
+}
+
 void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, const plr_real A[4],
                    unsigned most_steps) {
     plr_grid g;
-    plr_real d[2], squares = 0;
+    plr_real d[2], last[2] = {0, 0}, share = 1, squares = 0;
     fit->ended = false;
     fit->likeness = 0;
     for (fit->steps = 0; fit->steps < most_steps && !fit->ended;) {
         fit->inside = plr_grid_place(&g, image, fit->at, A);
         if (!fit->inside || !step(fit, image, &g, t, d, &squares))
             return;
-        const plr_real length = PLR_SQRT(PLR_FMA(d[0], d[0], d[1] * d[1]));
-        const plr_real cut = length > STEP_MAX ? STEP_MAX / length : PLR_R(1);
+        share = fit->steps > 1 ? share_of(d, last, share) : PLR_R(1);
+        last[0] = d[0], last[1] = d[1];
+        const plr_real length = share * PLR_SQRT(PLR_FMA(d[0], d[0], d[1] * d[1]));
+        const plr_real cut = length > STEP_MAX ? share * STEP_MAX / length : share;
         d[0] *= cut, d[1] *= cut;
         fit->at[0] = PLR_FMA(-A[0], d[0], PLR_FMA(-A[1], d[1], fit->at[0]));
         fit->at[1] = PLR_FMA(-A[2], d[0], PLR_FMA(-A[3], d[1], fit->at[1]));

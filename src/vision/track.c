@@ -6,7 +6,7 @@
 #include "math/small.h"
 #include "vision/patch.h"
 
-enum { STEPS_COARSE = 5, STEPS_FINEST = 10 };
+enum { STEPS_COARSE = 5, STEPS_FINEST = 10, CENTRE_MOVES = 4, HALF = PLR_PATCH_SIDE / 2 };
 
 /* Normalised correlation that is enough: with the patch of the birth, with the other picture. */
 #define LIKE PLR_R(0.8)
@@ -18,15 +18,26 @@ enum { STEPS_COARSE = 5, STEPS_FINEST = 10 };
 #define SMALLEST PLR_R(0.45)
 #define LARGEST  PLR_R(2.2)
 
+/* Coarse levels may lead astray: at <- the place from which it began, where that is likelier. */
+static void choose(plr_real at[2], const plr_real begun[2], const plr_image *image, unsigned level,
+                   const plr_template *t, const plr_real A[4]) {
+    const plr_real led[2] = {plr_pyramid_down(at[0], level), plr_pyramid_down(at[1], level)};
+    const plr_real own[2] = {plr_pyramid_down(begun[0], level), plr_pyramid_down(begun[1], level)};
+    if (plr_patch_likeness(image, t, own, A) > plr_patch_likeness(image, t, led, A))
+        at[0] = begun[0], at[1] = begun[1];
+}
+
 /* Finds `patch` of so many levels near `at` (px of level 0, in and out), from the level `from` on. */
 static bool find(plr_vision *v, const plr_levels *in, const uint8_t (*patch)[PLR_PATCH_BYTES],
                  unsigned from, const plr_real A[4], plr_real at[2], plr_fit *fit) {
     plr_template t;
+    const plr_real begun[2] = {at[0], at[1]};
     plr_real start[2] = {at[0], at[1]};
     memset(fit, 0, sizeof *fit);
     for (unsigned level = from + 1; level-- > 0;) {
         if (!plr_template_make(&t, patch[level]))
             continue;
+        choose(at, begun, &in->level[level], level, &t, A);
         start[0] = at[0], start[1] = at[1];
         fit->at[0] = plr_pyramid_down(at[0], level), fit->at[1] = plr_pyramid_down(at[1], level);
         plr_patch_fit(fit, &in->level[level], &t, A, level > 0 ? STEPS_COARSE : STEPS_FINEST);
@@ -130,15 +141,35 @@ bool plr_track_follow(plr_vision *v, const plr_scene *s, plr_track *t) {
     return true;
 }
 
-bool plr_track_begin(const plr_vision *v, const plr_scene *s, plr_track *t, const plr_real at[2]) {
+/* Moves a birth by whole px to the centre of its patch: then a deformation that is not quite the expected
+ * one moves it least. A centre outside the patch is none. False where the patch has no contrast. */
+static bool centre(const plr_image *image, plr_real at[2], uint8_t *patch) {
     plr_template template;
+    plr_real c[2];
+    for (int moves = 0;; moves++) {
+        if (!plr_patch_cut(image, at, patch) || !plr_template_make(&template, patch))
+            return false;
+        plr_template_centre(&template, c);
+        if (moves == CENTRE_MOVES || !(plr_abs(c[0]) < HALF && plr_abs(c[1]) < HALF))
+            return true;
+        const int x = (int)(c[0] + HALF + PLR_R(0.5)) - HALF;
+        const int y = (int)(c[1] + HALF + PLR_R(0.5)) - HALF;
+        if (x == 0 && y == 0)
+            return true;
+        at[0] += (plr_real)x, at[1] += (plr_real)y;
+    }
+}
+
+bool plr_track_begin(const plr_vision *v, const plr_scene *s, plr_track *t, const plr_real at[2]) {
     memset(t, 0, sizeof *t);
     t->at[0] = at[0], t->at[1] = at[1];
+    if (!centre(&s->side[PLR_LEFT].level[0], t->at, t->patch[0]))
+        return false;
     t->A[0] = t->A[3] = 1;
     t->likeness = 1;
-    t->levels = (uint8_t)cut(&s->side[PLR_LEFT], at, t->patch);
+    t->levels = (uint8_t)cut(&s->side[PLR_LEFT], t->at, t->patch);
     t->id = v->next_id;
-    return t->levels > 0 && plr_template_make(&template, t->patch[0]);
+    return t->levels > 0;
 }
 
 /* --- from left to right --- */

@@ -200,9 +200,9 @@ static bool is_taken(const plr_vision *v, const plr_real at[2], plr_real px) {
     return false;
 }
 
-static bool begin(plr_vision *v, const plr_scene *s, const plr_real at[2]) {
+static bool begin(plr_vision *v, const plr_scene *s, const plr_real at[2], plr_real apart) {
     plr_track *t = &v->tracks[v->track_count];
-    if (!plr_track_begin(v, s, t, at))
+    if (!plr_track_begin(v, s, t, at) || is_taken(v, t->at, apart))
         return false;
     v->report.corners++;
     if (!plr_track_match(v, s, t, true)) {
@@ -228,7 +228,7 @@ static void fill(plr_vision *v, const plr_scene *s) {
         if (is_taken(v, at, apart))
             continue;
         tries--;
-        if (begin(v, s, at)) {
+        if (begin(v, s, at, apart)) {
             v->track_count++, v->next_id++;
             v->report.born++;
         }
