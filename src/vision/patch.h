@@ -60,6 +60,12 @@ bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]);
  * J~^T J~ c = J~^T (J o)~. */
 void plr_template_centre(const plr_template *t, plr_real centre[2]);
 
+/* How a surface lies, from what is left over where a fit has ended: the change of its slope, such that
+ * samples move by c (slope o), in the patch's px; `info` is the inverse of its covariance, xx xy yy. */
+bool plr_patch_slope(const plr_image *image, const plr_template *t, const plr_real at[2],
+                     const plr_real A[4], const plr_real c[2], plr_real change[2],
+                     plr_real info[3]);
+
 /* The grid of a place; false where a sample, or what it is interpolated from, lies outside. */
 bool plr_grid_place(plr_grid *g, const plr_image *image, const plr_real at[2], const plr_real A[4]);
 

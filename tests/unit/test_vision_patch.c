@@ -199,6 +199,33 @@ static void test_the_centre_of_a_patch_is_the_corner_in_it(void) {
     TEST_ASSERT_DOUBLE_WITHIN(0.3, -1.5, (double)centre[1]);
 }
 
+/* The second picture shows the first one sheared along its rows, as the other eye sees a floor. */
+static void test_a_slope_is_read_from_what_a_fit_leaves_over(void) {
+    double sum2 = 0;
+    for (int run = 0; run < 60; run++) {
+        const view as_is = view_at(run * 11.0, 3);
+        render(first, W, H, W, &scene, &as_is, &chance);
+        const double slope[2] = {rng_uniform(&chance, -0.1, 0.1), rng_uniform(&chance, -0.1, 0.1)};
+        view how = as_is; /* o in the first is at o - (slope o, 0) in the second */
+        how.A[0] = 1 / (1 - slope[0]), how.A[1] = slope[1] / (1 - slope[0]);
+        how.at[0] += U - how.A[0] * U - how.A[1] * V;
+        const double truth[2] = {U, V};
+        plr_fit fit;
+        (void)error_of(&how, one_to_one, truth, truth, &fit);
+        TEST_ASSERT_TRUE(fit.inside && fit.ended);
+        uint8_t patch[PLR_PATCH_BYTES];
+        plr_template t;
+        const plr_real middle[2] = {U, V}, c[2] = {-1, 0};
+        plr_real change[2], info[3];
+        const plr_image one = image_of(first), two = image_of(second);
+        TEST_ASSERT_TRUE(plr_patch_cut(&one, middle, patch) && plr_template_make(&t, patch));
+        TEST_ASSERT_TRUE(plr_patch_slope(&two, &t, fit.at, one_to_one, c, change, info));
+        sum2 += pow((double)change[0] - slope[0], 2) + pow((double)change[1] - slope[1], 2);
+        TEST_ASSERT_GREATER_THAN_DOUBLE(0, (double)(info[0] * info[2] - info[1] * info[1]));
+    }
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.035, sqrt(sum2 / 120)); /* those of the slopes are 0.058 */
+}
+
 /* The told covariance is that of the errors, where noise is all that is wrong. */
 static void test_the_told_uncertainty_is_that_of_the_errors(void) {
     double squares = 0, worst = 0;
