@@ -165,22 +165,30 @@ enum {
     PLR_VISION_CELLS = 20 * 20 /* most cells, of which each can show a corner */
 };
 
+/* A small piece of a surface, seen in the left picture. */
+typedef struct plr_surface {
+    plr_real disparity; /* in the virtual camera, px */
+    plr_real
+        slope[2]; /* and how that changes from px to px of the left picture: how the surface lies */
+} plr_surface;
+
 /* A point that is followed. */
 typedef struct plr_track {
     uint32_t id;
     uint16_t age;
-    uint8_t misses;     /* pairs in succession without an observation */
-    uint8_t why;        /* plr_track_end, once it has ended */
-    uint8_t levels;     /* of its patch: near the edge a coarse one does not fit */
-    bool seen;          /* in both pictures of the last pair */
-    plr_real at[2];     /* in the left picture, raw px */
-    plr_real right[2];  /* in the right one, when it was last found there */
-    plr_real drift[2];  /* from where it was expected to where it was found, px */
-    plr_real disparity; /* in the virtual camera, px, when it was last measured */
-    plr_real A[4];      /* from the patch to the left picture as it is now */
-    plr_real cov[3];    /* of `at`, xx xy yy, from the last fit */
-    plr_real var_right; /* of uR beside uL */
-    plr_real var_cut;   /* what cutting anew has cost, px^2 */
+    uint8_t misses;         /* pairs in succession without an observation */
+    uint8_t why;            /* plr_track_end, once it has ended */
+    uint8_t levels;         /* of its patch: near the edge a coarse one does not fit */
+    bool seen;              /* in both pictures of the last pair */
+    plr_real at[2];         /* in the left picture, raw px */
+    plr_real right[2];      /* in the right one, when it was last found there */
+    plr_real drift[2];      /* from where it was expected to where it was found, px */
+    plr_surface surface;    /* when it was last measured */
+    plr_real slope_info[3]; /* inverse of the covariance of its slope, xx xy yy */
+    plr_real A[4];          /* from the patch to the left picture as it is now */
+    plr_real cov[3];        /* of `at`, xx xy yy, from the last fit */
+    plr_real var_right;     /* of uR beside uL */
+    plr_real var_cut;       /* what cutting anew has cost, px^2 */
     plr_real likeness;
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
 } plr_track;

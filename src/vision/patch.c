@@ -1,17 +1,28 @@
 // SPDX-License-Identifier: MIT
 #include "vision/patch.h"
 
+#include <string.h>
+
 #include "math/small.h"
 
-enum { HALF = PLR_PATCH_SIDE / 2, KEPT_HALF = PLR_PATCH_KEPT / 2, FRACTION = 16, WEIGHT = 6 };
+enum {
+    HALF = PLR_PATCH_SIDE / 2,
+    KEPT_HALF = PLR_PATCH_KEPT / 2,
+    FRACTION = 16,
+    WEIGHT = 6,
+    FINE = 6
+};
 
 #define UNIT     PLR_R(65536)
 #define STEP_MAX PLR_R(2)    /* px */
 #define STEP_END PLR_R(0.02) /* px */
+/* Of a step, as the last two tell it. */
+#define SHARE_LEAST PLR_R(0.25)
+#define SHARE_MOST  PLR_R(2)
 /* Grey levels' noise that no residual may claim to be below: rounding to whole levels, twice. */
 #define GREY_VAR PLR_R(2.0 / 12 * PLR_GREY * PLR_GREY)
-/* What a patch that fits exactly is still off by: interpolation, aliasing, rounded weights; px^2. */
-#define FLOOR_VAR PLR_R(0.08 * 0.08)
+/* What a patch that fits exactly is still off by: the last step, rounded weights; px^2. */
+#define FLOOR_VAR PLR_R(0.03 * 0.03)
 /* A patch whose place this noise alone makes uncertain by half a pixel has no contrast. */
 #define WEAKEST (GREY_VAR * PLR_R(4))
 
@@ -74,6 +85,21 @@ bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]) {
     const plr_real det = PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
     /* the smaller eigenvalue is at least det / trace */
     return t->TT > 0 && det > WEAKEST * (t->H[0] + t->H[2]);
+}
+
+void plr_template_centre(const plr_template *t, plr_real centre[2]) {
+    int32_t S = 0, xS = 0, yS = 0;
+    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++)
+        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++) {
+            /* J is a multiple of PLR_GREY / 2 */
+            const int32_t s = (t->Jx[k] * (i - HALF) + t->Jy[k] * (j - HALF)) / (PLR_GREY / 2);
+            S += s, xS += t->Jx[k] * s, yS += t->Jy[k] * s;
+        }
+    const plr_real x = PLR_GREY / 2 * central(xS, S, t->sum_Jx);
+    const plr_real y = PLR_GREY / 2 * central(yS, S, t->sum_Jy);
+    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
+    centre[0] = PLR_FMA(t->H[2], x, -(t->H[1] * y)) * by_det;
+    centre[1] = PLR_FMA(t->H[0], y, -(t->H[1] * x)) * by_det;
 }
 
 /* --- sums --- */
@@ -186,18 +212,28 @@ static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const 
     return true;
 }
 
+/* The share of a step d that ends the swing of the last one. */
+static plr_real share_of(const plr_real d[2], const plr_real last[2], plr_real share) {
+    const plr_real x = d[0] - last[0], y = d[1] - last[1], change = PLR_FMA(x, x, y * y);
+    if (change > 0)
+        share *= -PLR_FMA(last[0], x, last[1] * y) / change;
+    return share < SHARE_LEAST ? SHARE_LEAST : share < SHARE_MOST ? share : SHARE_MOST;
+}
+
 void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, const plr_real A[4],
                    unsigned most_steps) {
     plr_grid g;
-    plr_real d[2], squares = 0;
+    plr_real d[2], last[2] = {0, 0}, share = 1, squares = 0;
     fit->ended = false;
     fit->likeness = 0;
     for (fit->steps = 0; fit->steps < most_steps && !fit->ended;) {
         fit->inside = plr_grid_place(&g, image, fit->at, A);
         if (!fit->inside || !step(fit, image, &g, t, d, &squares))
             return;
-        const plr_real length = PLR_SQRT(PLR_FMA(d[0], d[0], d[1] * d[1]));
-        const plr_real cut = length > STEP_MAX ? STEP_MAX / length : PLR_R(1);
+        share = fit->steps > 1 ? share_of(d, last, share) : PLR_R(1);
+        last[0] = d[0], last[1] = d[1];
+        const plr_real length = share * PLR_SQRT(PLR_FMA(d[0], d[0], d[1] * d[1]));
+        const plr_real cut = length > STEP_MAX ? share * STEP_MAX / length : share;
         d[0] *= cut, d[1] *= cut;
         fit->at[0] = PLR_FMA(-A[0], d[0], PLR_FMA(-A[1], d[1], fit->at[0]));
         fit->at[1] = PLR_FMA(-A[2], d[0], PLR_FMA(-A[3], d[1], fit->at[1]));
@@ -205,4 +241,80 @@ void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, 
     }
     fit->inside = plr_grid_place(&g, image, fit->at, A);
     uncertainty(fit, t, A, squares);
+}
+
+/* --- slopes --- */
+
+/* x <- H^-1 b, b - B^T x for the rest: what a move of the place explains is not the slope's. */
+static void solve2(const plr_real H[3], const plr_real b[2], plr_real x[2]) {
+    const plr_real by_det = 1 / PLR_FMA(H[0], H[2], -(H[1] * H[1]));
+    x[0] = PLR_FMA(H[2], b[0], -(H[1] * b[1])) * by_det;
+    x[1] = PLR_FMA(H[0], b[1], -(H[1] * b[0])) * by_det;
+}
+
+/* Sums over the samples of residuals r and of K = (J c) o, beside those of J. */
+typedef struct slope_sums {
+    int64_t rr, rJ[2], rK[2], KK[3], KJ[2][2];
+    int32_t r, K[2];
+} slope_sums;
+
+static void sum_slopes(slope_sums *s, const plr_image *image, const plr_grid *g,
+                       const plr_template *t, int32_t gain, const int32_t c[2]) {
+    memset(s, 0, sizeof *s);
+    for (int j = -HALF, k = 0; j <= HALF; j++)
+        for (int i = -HALF; i <= HALF; i++, k++) {
+            const int32_t I =
+                sample(image, g->x + i * g->A[0] + j * g->A[1], g->y + i * g->A[2] + j * g->A[3]);
+            const int32_t r = gain * I / (1 << FINE) - t->T[k];
+            const int32_t along = (t->Jx[k] * c[0] + t->Jy[k] * c[1]) / (1 << FINE);
+            const int32_t K[2] = {along * i, along * j}, J[2] = {t->Jx[k], t->Jy[k]};
+            s->r += r, s->rr += (int64_t)r * r;
+            for (int a = 0; a < 2; a++) {
+                s->K[a] += K[a];
+                s->rJ[a] += (int64_t)r * J[a], s->rK[a] += (int64_t)r * K[a];
+                for (int b = 0; b < 2; b++)
+                    s->KJ[a][b] += (int64_t)K[a] * J[b];
+            }
+            s->KK[0] += (int64_t)K[0] * K[0], s->KK[1] += (int64_t)K[0] * K[1];
+            s->KK[2] += (int64_t)K[1] * K[1];
+        }
+}
+
+bool plr_patch_slope(const plr_image *image, const plr_template *t, const plr_real at[2],
+                     const plr_real A[4], const plr_real c[2], plr_real change[2],
+                     plr_real info[3]) {
+    plr_grid g;
+    plr_patch_sums p;
+    slope_sums s;
+    if (!plr_grid_place(&g, image, at, A) || !(plr_abs(c[0]) < 4 && plr_abs(c[1]) < 4))
+        return false;
+    plr_patch_sum(&p, image, &g, t);
+    const plr_centred centre = centred(&p, t);
+    const plr_real gain = centre.II > 0 ? PLR_SQRT(t->TT / centre.II) : PLR_R(0);
+    if (!(gain > PLR_R(0.1) && gain < 10))
+        return false;
+    const int32_t fine[2] = {(int32_t)(c[0] * (1 << FINE)), (int32_t)(c[1] * (1 << FINE))};
+    sum_slopes(&s, image, &g, t, (int32_t)(gain * (1 << FINE)), fine);
+    const int32_t J[2] = {t->sum_Jx, t->sum_Jy};
+    const plr_real rJ[2] = {central(s.rJ[0], s.r, J[0]), central(s.rJ[1], s.r, J[1])};
+    plr_real b[2], move[2], B[2][2], X[2][2];
+    solve2(t->H, rJ, move);
+    for (int a = 0; a < 2; a++) {
+        B[a][0] = central(s.KJ[a][0], s.K[a], J[0]), B[a][1] = central(s.KJ[a][1], s.K[a], J[1]);
+        solve2(t->H, B[a], X[a]);
+        b[a] = central(s.rK[a], s.r, s.K[a]) - PLR_FMA(B[a][0], move[0], B[a][1] * move[1]);
+    }
+    info[0] = central(s.KK[0], s.K[0], s.K[0]) - PLR_FMA(B[0][0], X[0][0], B[0][1] * X[0][1]);
+    info[1] = central(s.KK[1], s.K[0], s.K[1]) - PLR_FMA(B[0][0], X[1][0], B[0][1] * X[1][1]);
+    info[2] = central(s.KK[2], s.K[1], s.K[1]) - PLR_FMA(B[1][0], X[1][0], B[1][1] * X[1][1]);
+    if (!(PLR_FMA(info[0], info[2], -(info[1] * info[1])) > 0 && info[0] > 0))
+        return false;
+    solve2(info, b, change);
+    const plr_real rest = central(s.rr, s.r, s.r) - PLR_FMA(rJ[0], move[0], rJ[1] * move[1]) -
+                          PLR_FMA(b[0], change[0], b[1] * change[1]);
+    const plr_real by = 1 / (2 * ((rest > 0 ? rest : 0) / (PLR_SAMPLES - 6) + GREY_VAR));
+    change[0] = -change[0], change[1] = -change[1];
+    for (int i = 0; i < 3; i++)
+        info[i] *= by;
+    return true;
 }

@@ -6,6 +6,9 @@
  * central differences J. A place p in a picture shows the patch through A, 2x2: sample I(o) at p + A o. With
  * means taken off (~), residuals are r = g I~ - T~, g = |T~| / |I~|; the step d = (J~^T J~)^-1 J~^T r leads
  * from p to p - A d. Sums over the 81 samples are integers, and exact.
+ *
+ * Central differences are not the slope of a sharp edge: steps would be too long or too short, each by the
+ * same share, and swing. Two of them in succession tell the share (Irons and Tuck 1969).
  */
 #ifndef PLR_VISION_PATCH_H
 #define PLR_VISION_PATCH_H
@@ -52,6 +55,16 @@ bool plr_patch_cut(const plr_image *image, const plr_real at[2], uint8_t patch[P
 
 /* Prepares a patch. False where it has no contrast in some direction. */
 bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]);
+
+/* The place of a patch, from its middle, about which it can grow or shrink without moving what a fit finds:
+ * J~^T J~ c = J~^T (J o)~. */
+void plr_template_centre(const plr_template *t, plr_real centre[2]);
+
+/* How a surface lies, from what is left over where a fit has ended: the change of its slope, such that
+ * samples move by c (slope o), in the patch's px; `info` is the inverse of its covariance, xx xy yy. */
+bool plr_patch_slope(const plr_image *image, const plr_template *t, const plr_real at[2],
+                     const plr_real A[4], const plr_real c[2], plr_real change[2],
+                     plr_real info[3]);
 
 /* The grid of a place; false where a sample, or what it is interpolated from, lies outside. */
 bool plr_grid_place(plr_grid *g, const plr_image *image, const plr_real at[2], const plr_real A[4]);

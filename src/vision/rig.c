@@ -186,51 +186,57 @@ plr_real plr_rig_depth(const plr_vision *v, plr_real disparity) {
 
 /* --- patches --- */
 
-/* Raw left pixel -> raw pixel of a side, at a depth; moved by the expected motion where it is forward. */
+/* Raw left pixel -> raw pixel of a side, by its disparity, which becomes the one it has then; moved by the
+ * expected motion where the side is the left one. */
 static bool carry(const plr_vision *v, const plr_expected_motion *m, int side, const plr_real px[2],
-                  plr_real depth, plr_real to[2]) {
+                  plr_real *disparity, plr_real to[2]) {
     plr_real X[3];
-    if (!plr_rig_point(v, m, PLR_LEFT, px, depth, X))
+    if (!plr_rig_point(v, m, PLR_LEFT, px, plr_rig_depth(v, *disparity), X))
         return false;
     if (side == PLR_LEFT) {
         plr_real moved[3];
+        const plr_real z = X[2];
         plr_mat3_vec(moved, m->R, X);
         for (int i = 0; i < 3; i++)
             X[i] = moved[i] + m->p[i];
+        *disparity *= z / X[2];
     }
     return X[2] > PLR_R(0.02) && plr_rig_pixel(v, m, side, X, to);
 }
 
+/* A: the middle, and what is beside and below it by half a patch. */
 static bool carry_patch(const plr_vision *v, const plr_expected_motion *m, int side,
-                        const plr_real px[2], plr_real depth, plr_real to[2], plr_real A[4]) {
-    const plr_real beside[2] = {px[0] + HALF_SIDE, px[1]}, below[2] = {px[0], px[1] + HALF_SIDE};
-    plr_real x[2], y[2];
-    if (!carry(v, m, side, px, depth, to))
+                        const plr_real px[2], plr_surface *s, plr_real to[2], plr_real A[4]) {
+    const plr_surface was = *s;
+    plr_real slope[2];
+    if (!carry(v, m, side, px, &s->disparity, to))
         return false;
+    for (int j = 0; A && j < 2; j++) {
+        const plr_real at[2] = {px[0] + (j == 0 ? HALF_SIDE : 0), px[1] + (j == 1 ? HALF_SIDE : 0)};
+        plr_real there[2], disparity = PLR_FMA(HALF_SIDE, was.slope[j], was.disparity);
+        if (!carry(v, m, side, at, &disparity, there))
+            return false;
+        A[j] = (there[0] - to[0]) / HALF_SIDE;
+        A[2 + j] = (there[1] - to[1]) / HALF_SIDE;
+        slope[j] = (disparity - s->disparity) / HALF_SIDE;
+    }
     if (!A)
         return true;
-    if (!carry(v, m, side, beside, depth, x) || !carry(v, m, side, below, depth, y))
+    const plr_real det = PLR_FMA(A[0], A[3], -(A[1] * A[2]));
+    if (!(plr_abs(det) > PLR_R(0.01)))
         return false;
-    for (int i = 0; i < 2; i++) {
-        A[2 * i] = (x[i] - to[i]) / HALF_SIDE;
-        A[2 * i + 1] = (y[i] - to[i]) / HALF_SIDE;
-    }
+    s->slope[0] = PLR_FMA(A[3], slope[0], -(A[2] * slope[1])) / det;
+    s->slope[1] = PLR_FMA(A[0], slope[1], -(A[1] * slope[0])) / det;
     return true;
 }
 
 bool plr_rig_forward(const plr_vision *v, const plr_expected_motion *m, const plr_real px[2],
-                     plr_real *disparity, plr_real to[2], plr_real A[4]) {
-    const plr_real depth = plr_rig_depth(v, *disparity);
-    plr_real X[3];
-    if (!carry_patch(v, m, PLR_LEFT, px, depth, to, A) ||
-        !plr_rig_point(v, m, PLR_LEFT, px, depth, X))
-        return false;
-    *disparity *=
-        depth / PLR_FMA(X[2], m->R[8], PLR_FMA(X[1], m->R[7], PLR_FMA(X[0], m->R[6], m->p[2])));
-    return true;
+                     plr_surface *surface, plr_real to[2], plr_real A[4]) {
+    return carry_patch(v, m, PLR_LEFT, px, surface, to, A);
 }
 
 bool plr_rig_across(const plr_vision *v, const plr_expected_motion *m, const plr_real px[2],
-                    plr_real disparity, plr_real to[2], plr_real A[4]) {
-    return carry_patch(v, m, PLR_RIGHT, px, plr_rig_depth(v, disparity), to, A);
+                    const plr_surface *surface, plr_real to[2], plr_real A[4]) {
+    plr_surface seen = *surface;
+    return carry_patch(v, m, PLR_RIGHT, px, &seen, to, A);
 }

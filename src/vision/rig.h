@@ -38,16 +38,16 @@ bool plr_rig_pixel(const plr_vision *v, const plr_expected_motion *m, int side, 
 /* Its pixel in the virtual camera: at 0, or one baseline to the right. */
 void plr_rig_virtual(const plr_vision *v, int side, const plr_real X[3], plr_real px[2]);
 
-/* Where a raw pixel of the last left picture is seen in this one, by its disparity in the virtual camera,
- * which becomes the one that is expected now, and how a patch around it is deformed: A, 2x2. False where it is
- * not seen. */
+/* Where a raw pixel of the last left picture is seen in this one, by the surface that it shows, which
+ * becomes the one that is expected now, and how a patch around it is deformed: A, 2x2. False where it is not
+ * seen. */
 bool plr_rig_forward(const plr_vision *v, const plr_expected_motion *m, const plr_real px[2],
-                     plr_real *disparity, plr_real to[2], plr_real A[4]);
+                     plr_surface *surface, plr_real to[2], plr_real A[4]);
 
 /* Where a raw pixel of the left picture is seen in the right one, likewise; A may be
  * NULL. */
 bool plr_rig_across(const plr_vision *v, const plr_expected_motion *m, const plr_real px[2],
-                    plr_real disparity, plr_real to[2], plr_real A[4]);
+                    const plr_surface *surface, plr_real to[2], plr_real A[4]);
 
 /* The depth of a disparity; those at infinity and beyond stand at a thousand baselines' worth of pixels. */
 plr_real plr_rig_depth(const plr_vision *v, plr_real disparity);

@@ -6,7 +6,7 @@
 #include "math/small.h"
 #include "vision/patch.h"
 
-enum { STEPS_COARSE = 5, STEPS_FINEST = 10 };
+enum { STEPS_COARSE = 5, STEPS_FINEST = 10, CENTRE_MOVES = 4, HALF = PLR_PATCH_SIDE / 2 };
 
 /* Normalised correlation that is enough: with the patch of the birth, with the other picture. */
 #define LIKE PLR_R(0.8)
@@ -18,15 +18,34 @@ enum { STEPS_COARSE = 5, STEPS_FINEST = 10 };
 #define SMALLEST PLR_R(0.45)
 #define LARGEST  PLR_R(2.2)
 
+/* Surfaces face the camera, but for tilts whose tangent has this standard deviation. */
+#define TILT PLR_R(2)
+/* What is left over is mostly of interpolation, and the same in each pair: one counts as a share of all. */
+#define SLOPE_SHARE PLR_R(0.03)
+#define SLOPE_KEEP  PLR_R(0.9) /* of what is known of a slope, from pair to pair */
+#define SLOPE_MOST  PLR_R(1)
+enum { SLOPE_FITS = 3 }; /* of a birth */
+
+/* Coarse levels may lead astray: at <- the place from which it began, where that is likelier. */
+static void choose(plr_real at[2], const plr_real begun[2], const plr_image *image, unsigned level,
+                   const plr_template *t, const plr_real A[4]) {
+    const plr_real led[2] = {plr_pyramid_down(at[0], level), plr_pyramid_down(at[1], level)};
+    const plr_real own[2] = {plr_pyramid_down(begun[0], level), plr_pyramid_down(begun[1], level)};
+    if (plr_patch_likeness(image, t, own, A) > plr_patch_likeness(image, t, led, A))
+        at[0] = begun[0], at[1] = begun[1];
+}
+
 /* Finds `patch` of so many levels near `at` (px of level 0, in and out), from the level `from` on. */
 static bool find(plr_vision *v, const plr_levels *in, const uint8_t (*patch)[PLR_PATCH_BYTES],
                  unsigned from, const plr_real A[4], plr_real at[2], plr_fit *fit) {
     plr_template t;
+    const plr_real begun[2] = {at[0], at[1]};
     plr_real start[2] = {at[0], at[1]};
     memset(fit, 0, sizeof *fit);
     for (unsigned level = from + 1; level-- > 0;) {
         if (!plr_template_make(&t, patch[level]))
             continue;
+        choose(at, begun, &in->level[level], level, &t, A);
         start[0] = at[0], start[1] = at[1];
         fit->at[0] = plr_pyramid_down(at[0], level), fit->at[1] = plr_pyramid_down(at[1], level);
         plr_patch_fit(fit, &in->level[level], &t, A, level > 0 ? STEPS_COARSE : STEPS_FINEST);
@@ -71,7 +90,7 @@ static bool is_inside(const plr_vision *v, const plr_real at[2]) {
 
 bool plr_track_expect(const plr_vision *v, const plr_expected_motion *m, plr_track *t) {
     plr_real to[2], by[4];
-    if (!plr_rig_forward(v, m, t->at, &t->disparity, to, by))
+    if (!plr_rig_forward(v, m, t->at, &t->surface, to, by))
         return end(t, PLR_TRACK_LEFT_VIEW);
     const plr_real A[4] = {t->A[0], t->A[1], t->A[2], t->A[3]};
     for (int i = 0; i < 2; i++)
@@ -88,10 +107,11 @@ bool plr_track_expect(const plr_vision *v, const plr_expected_motion *m, plr_tra
 }
 
 bool plr_track_stays(const plr_vision *v, const plr_expected_motion *m, const plr_track *t) {
-    plr_real at[2] = {t->at[0], t->at[1]}, disparity = t->disparity;
+    plr_real at[2] = {t->at[0], t->at[1]};
+    plr_surface surface = t->surface;
     for (int pair = 0; pair < 2; pair++) {
         plr_real to[2], A[4];
-        if (!plr_rig_forward(v, m, at, &disparity, to, A) || !is_inside(v, to))
+        if (!plr_rig_forward(v, m, at, &surface, to, A) || !is_inside(v, to))
             return false;
         at[0] = to[0], at[1] = to[1];
     }
@@ -130,15 +150,35 @@ bool plr_track_follow(plr_vision *v, const plr_scene *s, plr_track *t) {
     return true;
 }
 
-bool plr_track_begin(const plr_vision *v, const plr_scene *s, plr_track *t, const plr_real at[2]) {
+/* Moves a birth by whole px to the centre of its patch: then a deformation that is not quite the expected
+ * one moves it least. A centre outside the patch is none. False where the patch has no contrast. */
+static bool centre(const plr_image *image, plr_real at[2], uint8_t *patch) {
     plr_template template;
+    plr_real c[2];
+    for (int moves = 0;; moves++) {
+        if (!plr_patch_cut(image, at, patch) || !plr_template_make(&template, patch))
+            return false;
+        plr_template_centre(&template, c);
+        if (moves == CENTRE_MOVES || !(plr_abs(c[0]) < HALF && plr_abs(c[1]) < HALF))
+            return true;
+        const int x = (int)(c[0] + HALF + PLR_R(0.5)) - HALF;
+        const int y = (int)(c[1] + HALF + PLR_R(0.5)) - HALF;
+        if (x == 0 && y == 0)
+            return true;
+        at[0] += (plr_real)x, at[1] += (plr_real)y;
+    }
+}
+
+bool plr_track_begin(const plr_vision *v, const plr_scene *s, plr_track *t, const plr_real at[2]) {
     memset(t, 0, sizeof *t);
     t->at[0] = at[0], t->at[1] = at[1];
+    if (!centre(&s->side[PLR_LEFT].level[0], t->at, t->patch[0]))
+        return false;
     t->A[0] = t->A[3] = 1;
     t->likeness = 1;
-    t->levels = (uint8_t)cut(&s->side[PLR_LEFT], at, t->patch);
+    t->levels = (uint8_t)cut(&s->side[PLR_LEFT], t->at, t->patch);
     t->id = v->next_id;
-    return t->levels > 0 && plr_template_make(&template, t->patch[0]);
+    return t->levels > 0;
 }
 
 /* --- from left to right --- */
@@ -155,17 +195,63 @@ static bool fit_right(plr_vision *v, const plr_scene *s, const uint8_t (*patch)[
     plr_fit fit;
     plr_real X[3], left[2], right[2];
     if (!find(v, &s->side[PLR_RIGHT], patch, from, A, at, &fit) ||
-        !plr_rig_point(v, &s->motion, PLR_LEFT, t->at, plr_rig_depth(v, t->disparity), X))
+        !plr_rig_point(v, &s->motion, PLR_LEFT, t->at, plr_rig_depth(v, t->surface.disparity), X))
         return false;
     plr_rig_virtual(v, PLR_LEFT, X, left);
-    if (!plr_rig_point(v, &s->motion, PLR_RIGHT, at, plr_rig_depth(v, t->disparity), X))
+    if (!plr_rig_point(v, &s->motion, PLR_RIGHT, at, plr_rig_depth(v, t->surface.disparity), X))
         return false;
     plr_rig_virtual(v, PLR_RIGHT, X, right);
     if (plr_abs(left[1] - right[1]) > ROW_GAP)
         return false;
-    t->disparity = left[0] - right[0];
+    t->surface.disparity = left[0] - right[0];
     t->right[0] = at[0], t->right[1] = at[1];
     t->var_right = fit.cov[0];
+    return true;
+}
+
+/* What the fit at `at` leaves over tells how the surface lies; older fits count less and less. */
+static void learn_slope(const plr_vision *v, const plr_scene *s, const uint8_t *patch,
+                        const plr_real A[4], plr_track *t, const plr_real at[2]) {
+    plr_template template;
+    plr_real beside[2], c[2], change[2], info[3];
+    plr_surface nearer = t->surface;
+    nearer.disparity += 1;
+    const plr_real d = det(A);
+    if (!plr_template_make(&template, patch) ||
+        !plr_rig_across(v, &s->motion, t->at, &t->surface, c, NULL) ||
+        !plr_rig_across(v, &s->motion, t->at, &nearer, beside, NULL) || !(plr_abs(d) > PLR_R(0.01)))
+        return;
+    const plr_real e[2] = {beside[0] - c[0], beside[1] - c[1]};
+    c[0] = PLR_FMA(A[3], e[0], -(A[1] * e[1])) / d, c[1] = PLR_FMA(A[0], e[1], -(A[2] * e[0])) / d;
+    if (!plr_patch_slope(&s->side[PLR_RIGHT].level[0], &template, at, A, c, change, info))
+        return;
+    plr_real *all = t->slope_info;
+    for (int i = 0; i < 3; i++)
+        info[i] *= SLOPE_SHARE, all[i] = PLR_FMA(SLOPE_KEEP, all[i], info[i]);
+    const plr_real x = PLR_FMA(info[0], change[0], info[1] * change[1]);
+    const plr_real y = PLR_FMA(info[1], change[0], info[2] * change[1]);
+    const plr_real det_all = PLR_FMA(all[0], all[2], -(all[1] * all[1]));
+    if (!(det_all > PLR_R(1e-4) * all[0] * all[2]))
+        return;
+    const plr_real by_det = 1 / det_all;
+    const plr_real slope[2] = {
+        PLR_FMA(PLR_FMA(all[2], x, -(all[1] * y)), by_det, t->surface.slope[0]),
+        PLR_FMA(PLR_FMA(all[0], y, -(all[1] * x)), by_det, t->surface.slope[1])};
+    for (int i = 0; i < 2; i++)
+        t->surface.slope[i] = slope[i] > SLOPE_MOST    ? SLOPE_MOST
+                              : slope[i] < -SLOPE_MOST ? -SLOPE_MOST
+                                                       : slope[i];
+}
+
+/* Fits the right picture with the patch deformed as the surface lies, and learns how it does. */
+static bool match_by_slope(plr_vision *v, const plr_scene *s,
+                           const uint8_t (*patch)[PLR_PATCH_BYTES], unsigned from, plr_track *t,
+                           plr_real at[2]) {
+    plr_real A[4];
+    if (!plr_rig_across(v, &s->motion, t->at, &t->surface, at, A) ||
+        !fit_right(v, s, patch, from, A, t, at))
+        return false;
+    learn_slope(v, s, patch[0], A, t, at);
     return true;
 }
 
@@ -198,15 +284,17 @@ static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t, c
                         unsigned level, bool mirror, plr_real *disparity) {
     plr_template template;
     plr_candidates c = {-1, -1000, -1};
+    plr_surface surface = {0, {0, 0}};
     plr_real infinity[2], A[4];
     const plr_real step = (plr_real)(1U << level);
     const plr_image *image = &s->side[PLR_RIGHT].level[level];
     if (!plr_template_make(&template, patch) ||
-        !plr_rig_across(v, &s->motion, t->at, 0, infinity, A))
+        !plr_rig_across(v, &s->motion, t->at, &surface, infinity, A))
         return false;
     for (plr_real d = mirror ? 4 * step : 0; d <= (plr_real)v->disparity_max; d += step) {
         plr_real at[2];
-        if (!plr_rig_across(v, &s->motion, t->at, d, at, NULL))
+        surface.disparity = d;
+        if (!plr_rig_across(v, &s->motion, t->at, &surface, at, NULL))
             continue;
         for (int i = 0; i < 2; i++)
             at[i] = plr_pyramid_down(mirror ? 2 * infinity[i] - at[i] : at[i], level);
@@ -219,20 +307,24 @@ static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t, c
 bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool birth) {
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
     const uint8_t(*const kept)[PLR_PATCH_BYTES] = (const uint8_t(*)[PLR_PATCH_BYTES])patch;
-    plr_real at[2], A[4];
+    plr_real at[2];
     const unsigned levels = cut(&s->side[PLR_LEFT], t->at, patch);
     if (levels == 0)
         return false;
     const unsigned level = search_level(v, levels), from = level > 0 ? 1 : 0;
     if (!birth)
-        return plr_rig_across(v, &s->motion, t->at, t->disparity, at, A) &&
-               fit_right(v, s, kept, from, A, t, at);
+        return match_by_slope(v, s, kept, from, t, at);
     plr_real disparity;
-    if (!search_line(v, s, t, kept[level], level, false, &disparity) ||
-        !plr_rig_across(v, &s->motion, t->at, disparity, at, A))
+    if (!search_line(v, s, t, kept[level], level, false, &disparity))
         return false;
-    t->disparity = disparity;
-    return fit_right(v, s, kept, level, A, t, at);
+    t->surface.disparity = disparity;
+    /* a surface of this tilt has the slope tilt times disparity / f */
+    const plr_real by = v->fx / (TILT * (disparity > 1 ? disparity : PLR_R(1)));
+    t->slope_info[0] = t->slope_info[2] = by * by;
+    for (int again = 0; again < SLOPE_FITS; again++)
+        if (!match_by_slope(v, s, kept, again == 0 ? level : 0, t, at))
+            return false;
+    return true;
 }
 
 bool plr_track_mirrored(plr_vision *v, const plr_scene *s, const plr_track *t) {

@@ -112,7 +112,7 @@ static void take_motion(const plr_vision *v, const plr_expected *e, const plr_pi
 static void take_depth(const plr_vision *v, const plr_expected *e, plr_track *t) {
     for (unsigned i = 0; e && i < e->depth_count; i++)
         if (e->depths[i].id == t->id && e->depths[i].z_m > 0 && e->depths[i].z_m < 1e9F)
-            t->disparity = v->fx * v->baseline / (plr_real)e->depths[i].z_m;
+            t->surface.disparity = v->fx * v->baseline / (plr_real)e->depths[i].z_m;
 }
 
 /* --- the tracks of a pair --- */
@@ -200,9 +200,9 @@ static bool is_taken(const plr_vision *v, const plr_real at[2], plr_real px) {
     return false;
 }
 
-static bool begin(plr_vision *v, const plr_scene *s, const plr_real at[2]) {
+static bool begin(plr_vision *v, const plr_scene *s, const plr_real at[2], plr_real apart) {
     plr_track *t = &v->tracks[v->track_count];
-    if (!plr_track_begin(v, s, t, at))
+    if (!plr_track_begin(v, s, t, at) || is_taken(v, t->at, apart))
         return false;
     v->report.corners++;
     if (!plr_track_match(v, s, t, true)) {
@@ -228,7 +228,7 @@ static void fill(plr_vision *v, const plr_scene *s) {
         if (is_taken(v, at, apart))
             continue;
         tries--;
-        if (begin(v, s, at)) {
+        if (begin(v, s, at, apart)) {
             v->track_count++, v->next_id++;
             v->report.born++;
         }
@@ -248,7 +248,7 @@ static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
     unsigned n = 0;
     for (unsigned i = 0; i < v->track_count; i++) {
         const plr_track *t = &v->tracks[i];
-        const plr_real depth = plr_rig_depth(v, t->disparity);
+        const plr_real depth = plr_rig_depth(v, t->surface.disparity);
         plr_real L[3], R[3], left[2], right[2];
         if (!t->seen || !plr_rig_point(v, &s->motion, PLR_LEFT, t->at, depth, L) ||
             !plr_rig_point(v, &s->motion, PLR_RIGHT, t->right, depth, R))

@@ -66,7 +66,7 @@ static unsigned rows_of(const plr_vision *v, const plr_expected_motion *m, plr_r
     unsigned n = 0;
     for (unsigned i = 0; i < v->track_count; i++) {
         const plr_track *t = &v->tracks[i];
-        const plr_real depth = plr_rig_depth(v, t->disparity);
+        const plr_real depth = plr_rig_depth(v, t->surface.disparity);
         plr_real L[3], R[3], left[2], right[2], turn[3];
         if (!t->seen || !plr_rig_point(v, m, PLR_LEFT, t->at, depth, L) ||
             !plr_rig_point(v, m, PLR_RIGHT, t->right, depth, R))

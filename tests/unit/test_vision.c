@@ -95,6 +95,24 @@ static void test_corners_are_born_with_their_disparity(void) {
     }
 }
 
+/* A floor: the disparity grows with the row, by a quarter of a px in each. */
+static void test_on_a_floor_the_disparity_is_that_of_the_point(void) {
+    const double steep = 0.25;
+    const view how = view_at(0, 0);
+    view there = how; /* (u, v) of the left picture is at (u - steep v, v) of the right one */
+    there.A[1] = steep;
+    render(left, W, H, STRIDE, &scene, &how, &chance);
+    render(right, W, H, STRIDE, &scene, &there, &chance);
+    TEST_ASSERT_EQUAL(PLR_OK, look(NULL));
+    TEST_ASSERT_GREATER_OR_EQUAL(15, frame.count);
+    unsigned good = 0;
+    for (unsigned i = 0; i < frame.count; i++) {
+        const plr_observation *o = &frame.observations[i];
+        good += fabs((double)(o->uL_px - o->uR_px) - steep * (double)o->vL_px) < 0.07;
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL(3 * frame.count / 4, good);
+}
+
 /* The patch of the birth is followed: after ten pairs a point has not drifted. */
 static void test_tracks_do_not_drift(void) {
     static plr_observation born[PLR_VISION_TRACKS];

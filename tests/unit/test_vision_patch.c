@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* Patches: kernels beside their twins, and places that are known exactly. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unity.h>
 
@@ -154,6 +155,75 @@ static void test_a_warp_that_is_told_is_followed_and_one_that_is_not_shows(void)
     (void)error_of(&how, one_to_one, begin, truth, &untold);
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.99, (double)told.likeness);
     TEST_ASSERT_LESS_THAN_DOUBLE((double)told.likeness - 0.01, (double)untold.likeness);
+}
+
+/* A thin cross: a step by central differences leads twice as far as it should. */
+static void test_sharp_lines_are_found_without_swinging(void) {
+    for (int run = 0; run < 20; run++) {
+        const double x = rng_uniform(&chance, -0.9, 0.9), y = rng_uniform(&chance, -0.9, 0.9);
+        for (int v = 0; v < H; v++)
+            for (int u = 0; u < W; u++) {
+                const double by[2] = {fmax(0, 1 - abs(u - U)), fmax(0, 1 - abs(v - V))};
+                const double to[2] = {fmax(0, 1 - fabs(u - U - x)), fmax(0, 1 - fabs(v - V - y))};
+                first[v * W + u] = (uint8_t)(40 + 100 * (by[0] + by[1]));
+                second[v * W + u] = (uint8_t)lrint(40 + 100 * (to[0] + to[1]));
+            }
+        uint8_t patch[PLR_PATCH_BYTES];
+        plr_template t;
+        plr_fit fit = {.at = {U, V}};
+        const plr_real middle[2] = {U, V};
+        const plr_image one = image_of(first), two = image_of(second);
+        TEST_ASSERT_TRUE(plr_patch_cut(&one, middle, patch));
+        TEST_ASSERT_TRUE(plr_template_make(&t, patch));
+        plr_patch_fit(&fit, &two, &t, one_to_one, 10);
+        TEST_ASSERT_TRUE(fit.inside && fit.ended);
+        TEST_ASSERT_DOUBLE_WITHIN(0.06, U + x, (double)fit.at[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(0.06, V + y, (double)fit.at[1]);
+    }
+}
+
+/* A corner two pixels beside the middle: about it, and not about the middle, the patch can grow. */
+static void test_the_centre_of_a_patch_is_the_corner_in_it(void) {
+    for (int v = 0; v < H; v++)
+        for (int u = 0; u < W; u++)
+            first[v * W + u] = u >= U + 2 && v >= V - 1 ? 200 : 60;
+    uint8_t patch[PLR_PATCH_BYTES];
+    plr_template t;
+    plr_real centre[2];
+    const plr_real middle[2] = {U, V};
+    const plr_image image = image_of(first);
+    TEST_ASSERT_TRUE(plr_patch_cut(&image, middle, patch));
+    TEST_ASSERT_TRUE(plr_template_make(&t, patch));
+    plr_template_centre(&t, centre);
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 1.5, (double)centre[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, -1.5, (double)centre[1]);
+}
+
+/* The second picture shows the first one sheared along its rows, as the other eye sees a floor. */
+static void test_a_slope_is_read_from_what_a_fit_leaves_over(void) {
+    double sum2 = 0;
+    for (int run = 0; run < 60; run++) {
+        const view as_is = view_at(run * 11.0, 3);
+        render(first, W, H, W, &scene, &as_is, &chance);
+        const double slope[2] = {rng_uniform(&chance, -0.1, 0.1), rng_uniform(&chance, -0.1, 0.1)};
+        view how = as_is; /* o in the first is at o - (slope o, 0) in the second */
+        how.A[0] = 1 / (1 - slope[0]), how.A[1] = slope[1] / (1 - slope[0]);
+        how.at[0] += U - how.A[0] * U - how.A[1] * V;
+        const double truth[2] = {U, V};
+        plr_fit fit;
+        (void)error_of(&how, one_to_one, truth, truth, &fit);
+        TEST_ASSERT_TRUE(fit.inside && fit.ended);
+        uint8_t patch[PLR_PATCH_BYTES];
+        plr_template t;
+        const plr_real middle[2] = {U, V}, c[2] = {-1, 0};
+        plr_real change[2], info[3];
+        const plr_image one = image_of(first), two = image_of(second);
+        TEST_ASSERT_TRUE(plr_patch_cut(&one, middle, patch) && plr_template_make(&t, patch));
+        TEST_ASSERT_TRUE(plr_patch_slope(&two, &t, fit.at, one_to_one, c, change, info));
+        sum2 += pow((double)change[0] - slope[0], 2) + pow((double)change[1] - slope[1], 2);
+        TEST_ASSERT_GREATER_THAN_DOUBLE(0, (double)(info[0] * info[2] - info[1] * info[1]));
+    }
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.035, sqrt(sum2 / 120)); /* those of the slopes are 0.058 */
 }
 
 /* The told covariance is that of the errors, where noise is all that is wrong. */
