@@ -25,7 +25,7 @@ INCLUDE = re.compile(
 )
 COMMENT_OR_TEXT = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.S)
 SPDX = re.compile(r"^// SPDX[^\n]*\n")
-# What a source keeps to itself, and another one may call by the same name.
+# Static names, which another source may use, too.
 STATIC = re.compile(r"^static\b[^;{=()]*?(\w+)(?:\[[^\]]*\])*[ ]*(?=[(;=])", re.M)
 TYPE = re.compile(
     r"^(?:typedef )?(?:static )?(?:const )?(?:struct|union|enum)\b"
@@ -34,9 +34,9 @@ TYPE = re.compile(
 )
 CONSTANT = re.compile(r"(\w+)\s*(?:=[^,]*)?(?:,|$)")
 MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.M)
-# Rooms that a build may leave out, and the option that says so.
+# Rooms that a build may leave out, with their options.
 ROOMS = {"supervise": "PLR_SUPERVISE", "known_map": "PLR_KNOWN_MAP", "vision": "PLR_VISION"}
-# Files that config.h chooses between: the condition, the file if it holds, and if not.
+# Files between which config.h chooses: the condition, the file if it holds, and if not.
 CHOICES = {
     "PLR_TILE_FILE": ("PLR_TILE_CORTEX_M", "math/tile_cortex_m.h", "math/tile_in_c.h"),
     "PLR_ROW_FILE": ("PLR_WASM_FMA", "math/row_wasm.h", "math/row_in_c.h"),
@@ -59,17 +59,17 @@ GUARD = """\
 
 
 def read(path: Path) -> str:
-    """A file's text without the licence line: one is enough."""
+    """Returns a file's text without the licence line: one is enough."""
     return SPDX.sub("", path.read_text(encoding="utf-8"))
 
 
 def without_comments(text: str) -> str:
-    """The code alone."""
+    """Returns the code alone."""
     return COMMENT_OR_TEXT.sub(" ", text)
 
 
 def names_of(text: str) -> set[str]:
-    """What a source defines at file level for itself alone."""
+    """Returns the static names that a source defines at file level."""
     code = without_comments(text)
     names = set(STATIC.findall(code))
     for body, name in TYPE.findall(code):
@@ -80,7 +80,7 @@ def names_of(text: str) -> set[str]:
 
 
 def renamed(text: str, names: set[str], prefix: str) -> str:
-    """The text with these names behind a prefix; members, comments and texts keep theirs."""
+    """Returns the text with these names prefixed; members, comments and texts keep theirs."""
     if not names:
         return text
     word = re.compile(r"(?<![\w.>])(?:" + "|".join(sorted(names)) + r")\b(?!\s*\")")
@@ -97,9 +97,9 @@ def renamed(text: str, names: set[str], prefix: str) -> str:
 
 @dataclass
 class Amalgamation:
-    """Files of a source tree put behind each other, each header once."""
+    """Joins the files of a source tree, each header once."""
 
-    folders: Sequence[Path]  # where what is included is looked for
+    folders: Sequence[Path]  # folders of included files
     done: set[Path]  # headers that are in already
 
     def find(self, name: str) -> Path:
@@ -109,7 +109,7 @@ class Amalgamation:
         raise SystemExit(f'"{name}" is in none of {", ".join(map(str, self.folders))}')
 
     def insides(self, text: str) -> str:
-        """A file's text with what it includes in the include's place."""
+        """Returns a file's text with its includes replaced by their text."""
 
         def included(match: re.Match[str]) -> str:
             if match[2]:
@@ -122,7 +122,7 @@ class Amalgamation:
         return INCLUDE.sub(included, text)
 
     def header(self, path: Path) -> str:
-        """The same of a header, at its first include; nothing later."""
+        """Returns the same for a header at its first include; empty later."""
         if path in self.done:
             return ""
         self.done.add(path)
@@ -132,7 +132,7 @@ class Amalgamation:
         return "".join(self.header(path) for path in paths)
 
     def sources(self, paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
-        """Each source, its own names made distinct, its macros ended where it ends."""
+        """Yields each source with distinct static names, and its macros undefined at its end."""
         texts = {path: read(path) for path in paths}
         shared = Counter(name for text in texts.values() for name in names_of(text))
         for path, text in texts.items():
@@ -142,13 +142,13 @@ class Amalgamation:
 
 
 def own_header_files(folder: Path) -> list[Path]:
-    """Headers that stand for themselves: some are included by a choice alone."""
+    """Returns the headers to include by themselves; some are included by a choice alone."""
     chosen = {Path(name).name for _, *names in CHOICES.values() for name in names}
     return [path for path in sorted(folder.rglob("*.h")) if path.name not in chosen]
 
 
 def library(root: Path) -> tuple[str, str]:
-    """pelorus.h and pelorus.c."""
+    """Returns pelorus.h and pelorus.c."""
     include, src = root / "include", root / "src"
     amalgamation = Amalgamation((include, src), set())
     version = re.search(r'plr_version\(void\) \{\s*return "([^"]+)"', all_text(src))
@@ -166,7 +166,7 @@ def library(root: Path) -> tuple[str, str]:
 
 
 def program(root: Path, paths: Sequence[Path]) -> str:
-    """One source of a program's: it includes pelorus.h."""
+    """Returns one source for a program; it includes pelorus.h."""
     amalgamation = Amalgamation((root / "include", root / "port"), set())
     amalgamation.headers(sorted((root / "include/pelorus").glob("*.h")))
     folders = sorted({path.parent for path in paths})
@@ -176,12 +176,12 @@ def program(root: Path, paths: Sequence[Path]) -> str:
 
 
 def all_text(folder: Path) -> str:
-    """All sources of a folder, for a search."""
+    """Returns all sources of a folder, for a search."""
     return "\n".join(path.read_text(encoding="utf-8") for path in sorted(folder.rglob("*.c")))
 
 
 def main() -> int:
-    """Writes both; the exit status."""
+    """Writes both files; returns the exit status."""
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         print(__doc__, file=sys.stderr)
         return 2

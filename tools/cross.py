@@ -44,7 +44,7 @@ Run = Callable[[Path, Sequence[str], Path], None]
 
 @dataclass(frozen=True)
 class Target:
-    """A system: zig's name of it, the library's flags, and who can run it here."""
+    """A system: zig's name of it, the library's flags, and the program that runs it here."""
 
     triple: str
     library: tuple[str, ...] = ()
@@ -74,7 +74,7 @@ TARGETS = {
 
 
 def compile_to(output: Path, source: Path, target: Target, flags: Sequence[str]) -> None:
-    """One file, linked where the output is no object."""
+    """Compiles one file, and links it where the output is no object."""
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", target.triple]
     command = [*zig, f"-O{target.level}", *COMMON, *flags]
     done = subprocess.run(
@@ -85,14 +85,14 @@ def compile_to(output: Path, source: Path, target: Target, flags: Sequence[str])
 
 
 def replay_sources(target: Target) -> list[Path]:
-    """Of pelorus-replay, without libzstd, for this system."""
+    """Returns the sources of pelorus-replay, without libzstd, for this system."""
     other = "posix" if target.windows else "windows"
     left_out = {"compressed_zstd.c", f"system_{other}.c"}
     return sorted(p for p in (ROOT / "port/posix").glob("*.c") if p.name not in left_out)
 
 
 def build_library(target: Target, folder: Path, bits: int = 32) -> Path:
-    """The library in this precision, as an object file in the folder, beside its sources."""
+    """Builds the library in this precision, as an object file in the folder, with its sources."""
     folder.mkdir(parents=True, exist_ok=True)
     header, library = amalgamate.library(ROOT)
     (folder / "pelorus.h").write_text(header, encoding="utf-8")
@@ -105,18 +105,18 @@ def build_library(target: Target, folder: Path, bits: int = 32) -> Path:
 
 
 def real(bits: int) -> str:
-    """The option that says the precision."""
+    """Returns the option for the precision."""
     return f"-DPLR_REAL={bits}"
 
 
 def port_flags(target: Target, bits: int) -> list[str]:
-    """What the files of `port` are told of the library."""
+    """Returns the library's options for the files of `port`."""
     arch = "x86-64-v3" if X86_64_V3[0] in target.library else ""
     return [*WARNINGS, real(bits), f'-DPELORUS_ARCH="{arch}"']
 
 
 def build(target: Target, folder: Path, bits: int = 32) -> Path:
-    """The program, in the folder."""
+    """Builds the program in the folder."""
     library = build_library(target, folder, bits)
     replay = amalgamate.program(ROOT, replay_sources(target))
     (folder / "replay.c").write_text(replay, encoding="utf-8")
@@ -130,7 +130,7 @@ def build(target: Target, folder: Path, bits: int = 32) -> Path:
 
 
 def runner_of(target: Target) -> str | None:
-    """The program that runs it, where there is one; Debian keeps wine out of the way."""
+    """Returns the program that runs it, where there is one; Debian hides wine."""
     return shutil.which(target.runner, path=f"{os.environ.get('PATH', '')}:/usr/lib/wine")
 
 
@@ -148,7 +148,7 @@ def run_program(target: Target, program: Path, words: Sequence[str], folder: Pat
 
 
 def run_wasm(program: Path, words: Sequence[str], folder: Path) -> None:
-    """The same by wasmtime, which lends it the folder."""
+    """Runs it by wasmtime, which gives it the folder."""
     import wasmtime  # noqa: PLC0415 - only where it is needed
 
     engine = wasmtime.Engine()
@@ -170,7 +170,7 @@ def run_wasm(program: Path, words: Sequence[str], folder: Path) -> None:
 
 
 def can_run(target: Target) -> bool:
-    """Whether this machine has what runs it."""
+    """Returns whether this machine has what runs it."""
     if target.runner == "wasmtime":
         return subprocess.run(
             [sys.executable, "-c", "import wasmtime"], capture_output=True, check=False
@@ -179,7 +179,7 @@ def can_run(target: Target) -> bool:
 
 
 def digest(run: Callable[[Sequence[str]], None], folder: Path) -> str:
-    """SHA-256 over the trajectories of all recordings."""
+    """Returns SHA-256 over the trajectories of all recordings."""
     sums = hashlib.sha256()
     for name in RECORDINGS:
         run([f"{name}.plr", *SETTINGS, "--trajectory", f"{name}.tum"])
@@ -192,14 +192,14 @@ def digest(run: Callable[[Sequence[str]], None], folder: Path) -> str:
 
 
 def simulate(folder: Path) -> None:
-    """The recordings, made anew."""
+    """Simulates the recordings anew."""
     for name, words in RECORDINGS.items():
         command = [sys.executable, "-m", "pelorus", "simulate", *words, str(folder / f"{name}.plr")]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def asked_for(what: str, known: Iterable[str], folder: str) -> tuple[Path, list[str]]:
-    """The command line: the folder for what is built, and which of the known systems, or all."""
+    """Parses the command line: the folder for the build, and which of the known systems, or all."""
     names = list(known)
     parser = argparse.ArgumentParser(description=what.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / folder, help="where to build")
@@ -212,7 +212,7 @@ def asked_for(what: str, known: Iterable[str], folder: str) -> tuple[Path, list[
 
 
 def main() -> int:
-    """Builds, runs, compares; the exit status."""
+    """Builds, runs, compares; returns the exit status."""
     out, names = asked_for(__doc__, TARGETS, "build/cross")
     differ = 0
     with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:

@@ -32,7 +32,7 @@ DRIVE = Options(
     duration_s=30.0,
     speed_mps=1.5,
     twist_rate_hz=50.0,
-    twist_timing=TwistTiming.MID,  # a reading is of its moment
+    twist_timing=TwistTiming.MID,  # a reading holds at its stamp
     range_m=20.0,
     bias_velocity_sigma_mps=0.02,
     bias_gyro_sigma_radps=0.01,
@@ -40,7 +40,7 @@ DRIVE = Options(
 
 
 def write(folder: Path) -> None:
-    """odometry.csv, gyro.csv, tracks.csv, camchain.yaml, truth.tum."""
+    """Writes odometry.csv, gyro.csv, tracks.csv, camchain.yaml, truth.tum."""
     drive = simulate(DRIVE).recording
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -63,12 +63,12 @@ def write(folder: Path) -> None:
 
 
 def stamps(t_ns: NDArray[np.int64]) -> list[int]:
-    """On the robot's clock."""
+    """Returns the times on the robot's clock, ms."""
     return [BEGIN_MS + t // 1_000_000 for t in t_ns.tolist()]
 
 
 def bent(camera: Camera, pixels: Floats) -> Floats:
-    """Where the raw pictures have what the rectified ones have at (n, 4) pixels."""
+    """Returns the raw pixels of rectified ones (n, 4)."""
     K = np.array([[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1.0]])
     rays = (pixels.reshape(-1, 2) - K[:2, 2]) / (camera.fx_px, camera.fy_px)
     points = np.column_stack((rays, np.ones(len(rays))))
@@ -77,7 +77,7 @@ def bent(camera: Camera, pixels: Floats) -> Floats:
 
 
 def write_csv(path: Path, titles: str, t_ms: list[int], values: Floats) -> None:
-    """A row a reading, time first."""
+    """Writes a row for each reading, time first."""
     with path.open("w", newline="") as stream:
         table = csv.writer(stream)
         table.writerow(titles.split(","))
@@ -87,7 +87,7 @@ def write_csv(path: Path, titles: str, t_ms: list[int], values: Floats) -> None:
 
 
 def write_calibration(path: Path, drive: Recording) -> None:
-    """As Kalibr writes a camchain-imucam; the robot's body is the gyro's."""
+    """Writes Kalibr's camchain-imucam; the robot's body is the gyro's."""
     camera = drive.header.camera
     to_right = np.eye(4)
     to_right[0, 3] = -camera.baseline_m

@@ -33,7 +33,7 @@ ROOT = cross.ROOT
 PARTS = ROOT / "docs/site"
 PROGRAMS = {"RELAXED": "wasi-relaxed", "PORTABLE": "wasi"}
 DRIVE, DRIVE_SUM = ROOT / "tests/golden/drive.plr", ROOT / "tests/golden/drive.sha256"
-DRIVE_WORDS = ("--slots", "32")  # of the boards
+DRIVE_WORDS = ("--slots", "32")  # options of the boards' drive
 PICTURES = ("*.png", "*.webp")
 Known = dict[str, Sequence[str] | dict[str, str]]
 SOURCE_LINK = re.compile(r"\]\(((?:\.\./)?([\w./-]+\.(h|c|py)))\)")
@@ -41,7 +41,7 @@ LANGUAGES = {"h": "c", "c": "c", "py": "python"}
 
 
 def trajectory_sum(recording: Path, words: tuple[str, ...], folder: Path) -> str:
-    """SHA-256 of the trajectory that the desk finds."""
+    """Returns SHA-256 of the trajectory on the desk."""
     path = folder / f"{recording.stem}.tum"
     command = [str(cross.NATIVE), str(recording), *words, "--quiet", "--trajectory", str(path)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -49,7 +49,7 @@ def trajectory_sum(recording: Path, words: tuple[str, ...], folder: Path) -> str
 
 
 def drives(folder: Path) -> tuple[dict[str, bytes], dict[str, Known]]:
-    """The recordings of the page, and with which words they have which sums."""
+    """Returns the recordings of the page, with the sums of their trajectories by options."""
     minute = folder / "minute.plr"
     command = [sys.executable, "-m", "pelorus", "simulate", str(minute)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -68,7 +68,7 @@ def drives(folder: Path) -> tuple[dict[str, bytes], dict[str, Known]]:
 
 
 def replay_page(out: Path) -> Path:
-    """The page, in one file."""
+    """Builds the page in one file."""
     if not cross.NATIVE.is_file():
         sys.exit(f"{cross.NATIVE} is not there: tools/demo.sh builds it")
     packed = {
@@ -88,7 +88,7 @@ def replay_page(out: Path) -> Path:
 
 
 def copied(source: Path, target: Path) -> set[str]:
-    """A page, whose links to sources lead to their pages; which sources those are."""
+    """Copies a page, with links to sources changed to their pages; returns these sources."""
     target.parent.mkdir(parents=True, exist_ok=True)
     text = source.read_text("utf-8")
     target.write_text(SOURCE_LINK.sub(r"](\1.md)", text), encoding="utf-8")
@@ -96,7 +96,7 @@ def copied(source: Path, target: Path) -> set[str]:
 
 
 def stage(folder: Path, replay: Path | None) -> None:
-    """What zensical builds: its settings, and `pages`, laid out as the repository is."""
+    """Prepares what zensical builds: its settings, and `pages`, laid out as the repository is."""
     pages = folder / "pages"
     headers = [one.relative_to(ROOT).as_posix() for one in (ROOT / "include/pelorus").glob("*.h")]
     sources = set(headers)
@@ -122,7 +122,7 @@ def stage(folder: Path, replay: Path | None) -> None:
 
 
 def built(folder: Path) -> Path:
-    """The site of what is staged there."""
+    """Builds the site of what is staged there."""
     command = [
         sys.executable,
         "-m",
@@ -140,7 +140,7 @@ def built(folder: Path) -> Path:
 
 
 def documentation(out: Path, replay: Path | None) -> Path:
-    """The whole site, with the page in it."""
+    """Builds the whole site, with the replay page in it."""
     if importlib.util.find_spec("zensical") is None:
         sys.exit("zensical is not there: pip install --requirement tools/requirements.lock")
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
@@ -150,7 +150,7 @@ def documentation(out: Path, replay: Path | None) -> Path:
 
 
 def main() -> int:
-    """Builds it; the exit status."""
+    """Builds it; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "build/site", help="its folder")
     parser.add_argument("--only", choices=("docs", "replay"), help="a part of it")

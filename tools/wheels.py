@@ -25,7 +25,7 @@ from cross import ROOT, X86_64_V3, Target, asked_for, build, compile_to, port_fl
 from PIL import Image
 
 NATIVE = "pelorus/native"
-PICTURE_PX = 800  # of README, in the wheel
+PICTURE_PX = 800  # of README's picture in the wheel
 WHEELS = {
     "manylinux_2_17_x86_64": Target("x86_64-linux-gnu.2.17", X86_64_V3),
     "manylinux_2_17_aarch64": Target("aarch64-linux-gnu.2.17"),
@@ -36,14 +36,14 @@ WHEELS = {
 
 
 def suffix(target: Target) -> str:
-    """Of a library, as tools/pelorus/native.py looks for it."""
+    """Returns the suffix of a library, as tools/pelorus/native.py looks for it."""
     if target.windows:
         return ".dll"
     return ".dylib" if "macos" in target.triple else ".so"
 
 
 def build_binding(target: Target, folder: Path, bits: int) -> Path:
-    """The library as Python loads it; `build` has been here."""
+    """Builds the library as Python loads it, after `build`."""
     sources = [ROOT / "port/python/binding.c", ROOT / "port/posix/processor.c"]
     (folder / "binding.c").write_text(amalgamate.program(ROOT, sources), encoding="utf-8")
     made = folder / f"pelorus-filter{'-f64' if bits == 64 else ''}{suffix(target)}"
@@ -54,7 +54,7 @@ def build_binding(target: Target, folder: Path, bits: int) -> Path:
 
 
 def pip_wheel(folder: Path) -> Path:
-    """This machine's."""
+    """Builds this machine's wheel."""
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
     command += ["--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)]
     subprocess.run(command, check=True)
@@ -63,14 +63,15 @@ def pip_wheel(folder: Path) -> Path:
 
 
 def run_wheel(*words: str | Path) -> None:
-    """The package `wheel`: it unpacks wheels, and packs them with their list of contents."""
+    """Runs the package `wheel`, which unpacks wheels and packs them with their list of contents."""
     command = [sys.executable, "-m", "wheel", *map(str, words)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def standalone(readme: str) -> str:
-    """The README away from its checkout: its pictures are in it, small and at rest; a link to
-    another file is its words alone.
+    """Returns the README for use without its checkout.
+
+    Its pictures are embedded and still; a link to another file becomes its words.
     """
 
     def packed(picture: re.Match[str]) -> str:
@@ -88,7 +89,7 @@ def standalone(readme: str) -> str:
 
 
 def make(tag: str, target: Target, own: Path, work: Path, out: Path) -> Path:
-    """The wheel for the system of the tag, out of this machine's own."""
+    """Makes the wheel for the system of the tag from this machine's own."""
     run_wheel("unpack", own, "--dest", work / "unpacked")
     (content,) = (work / "unpacked").iterdir()
     shutil.rmtree(content / NATIVE)
@@ -109,7 +110,7 @@ def make(tag: str, target: Target, own: Path, work: Path, out: Path) -> Path:
 
 
 def main() -> int:
-    """Builds them; the exit status."""
+    """Builds the wheels; returns the exit status."""
     out, tags = asked_for(__doc__, WHEELS, "build/wheels")
     with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:
         folder = Path(temporary)

@@ -5,30 +5,33 @@
 
 #if !PLR_KNOWN_MAP
 
-bool plr_map_is_asked(const plr_filter *f) {
-    (void)f;
+bool plr_map_is_asked(const plr_config *config, const plr_map *map) {
+    (void)config, (void)map;
     return false;
 }
 
-bool plr_map_ask(const plr_filter *f, uint32_t id, plr_landmark *known) {
-    (void)f, (void)id, (void)known;
+bool plr_map_ask(const plr_map *map, uint32_t id, plr_landmark *known) {
+    (void)map, (void)id, (void)known;
     return false;
 }
 
-bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+bool plr_find_pose(const plr_belief *belief, const plr_camera_model *camera, const plr_map *map,
+                   plr_real *Vt, const plr_sightings *sightings, bool guesses,
                    plr_found_pose *found) {
-    (void)f, (void)frame, (void)n, (void)guesses, (void)found;
+    (void)belief, (void)camera, (void)map, (void)Vt, (void)sightings, (void)guesses, (void)found;
     return false;
 }
 
-bool plr_find_likeliest_pose(plr_filter *f, const plr_frame *frame, unsigned n,
-                             plr_found_pose *found) {
-    (void)f, (void)frame, (void)n, (void)found;
+bool plr_find_likeliest_pose(const plr_belief *belief, const plr_camera_model *camera,
+                             const plr_motion *motion, const plr_map *map, plr_real *Vt,
+                             const plr_sightings *sightings, plr_found_pose *found) {
+    (void)belief, (void)camera, (void)motion, (void)map, (void)Vt, (void)sightings, (void)found;
     return false;
 }
 
-bool plr_find_gap(const plr_filter *f, const plr_found_pose *found, plr_pose_gap *gap) {
-    (void)f, (void)found, (void)gap;
+bool plr_find_gap(const plr_belief *belief, const plr_camera_model *camera,
+                  const plr_motion *motion, const plr_found_pose *found, plr_pose_gap *gap) {
+    (void)belief, (void)camera, (void)motion, (void)found, (void)gap;
     return false;
 }
 

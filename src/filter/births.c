@@ -7,7 +7,7 @@
 #include "known_map/lookup.h"
 #include "pelorus/assertions.h"
 #include "sensor/stereo.h"
-#include "state/slots.h"
+#include "state/sightings.h"
 
 bool plr_births_are_allowed(const plr_filter *f) {
     return f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
@@ -15,11 +15,12 @@ bool plr_births_are_allowed(const plr_filter *f) {
 
 /* Initialises a landmark. A slot must be free, and plr_stereo_makes_landmark true. */
 static void append_new(plr_filter *f, const plr_observation *seen) {
-    PLR_ASSERT(f->count < PLR_MAX_LANDMARKS && plr_stereo_makes_landmark(f, seen));
+    PLR_ASSERT(f->belief.count < PLR_MAX_LANDMARKS &&
+               plr_stereo_makes_landmark(&f->belief, &f->camera, seen));
     plr_new_landmark landmark;
-    const plr_real beyond = plr_stereo_initialise(f, seen, &landmark);
-    plr_slots_append(f, seen->id, false, &landmark);
-    f->slots[f->count - 1].beyond = beyond;
+    const plr_real beyond = plr_stereo_initialise(&f->belief, &f->camera, seen, &landmark);
+    plr_slots_append(&f->belief, seen->id, false, &landmark);
+    f->belief.slots[f->belief.count - 1].beyond = beyond;
 }
 
 enum { CELLS_ACROSS = 4, CELLS = CELLS_ACROSS * CELLS_ACROSS };
@@ -30,7 +31,7 @@ static unsigned quarter(plr_real x, plr_real centre) {
 }
 
 static unsigned cell_of(const plr_filter *f, const plr_observation *seen) {
-    const plr_camera *camera = &f->par.camera;
+    const plr_camera *camera = &f->camera.given;
     return CELLS_ACROSS * quarter((plr_real)seen->vL_px, camera->cy) +
            quarter((plr_real)seen->uL_px, camera->cx);
 }
@@ -53,18 +54,21 @@ enum { MATCHED = CELLS, POOR, BORN };
  * the image have their share (D'Hondt's method), and in each the lowest ids come first: points that lie
  * together tell the same of the motion, those that are spread tell its six numbers apart. To begin where
  * the fewest are followed instead would take wrong matches, which often lie alone. */
-static void choose_births(const plr_filter *f, const plr_frame *frame, unsigned n,
+static void choose_births(const plr_filter *f, const plr_sightings *sightings,
                           uint8_t fate[PLR_MAX_OBSERVATIONS]) {
     plr_cell cells[CELLS] = {{0, 0}};
+    const unsigned n = sightings->count;
     for (unsigned k = 0; k < n; k++) {
-        const plr_observation *o = &frame->observations[f->work.order[k]];
+        const plr_observation *o = sightings->at[k].seen;
         const unsigned cell = cell_of(f, o);
-        const bool matched = f->work.slot_of[k] != PLR_NO_SLOT;
-        fate[k] = (uint8_t)(matched ? MATCHED : plr_stereo_makes_landmark(f, o) ? cell : POOR);
+        const bool matched = plr_is_matched(&sightings->at[k]);
+        fate[k] = (uint8_t)(matched                                                ? MATCHED
+                            : plr_stereo_makes_landmark(&f->belief, &f->camera, o) ? cell
+                                                                                   : POOR);
         cells[cell].seen += fate[k] != POOR;
         cells[cell].followed += matched;
     }
-    for (unsigned room = plr_slots_room(f); room > 0; room--) {
+    for (unsigned room = plr_slots_room(&f->belief); room > 0; room--) {
         unsigned next = n;
         for (unsigned k = 0; k < n; k++)
             if (fate[k] < CELLS && (next == n || is_behind(&cells[fate[k]], &cells[fate[next]])))
@@ -78,18 +82,19 @@ static void choose_births(const plr_filter *f, const plr_frame *frame, unsigned 
 
 /* Landmarks that a frame makes which rejects nearly all that it matched would agree with its pose in the
  * next frames, against those that show where the body is. */
-void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n, bool none,
+void plr_births_from_unmatched(plr_filter *f, const plr_sightings *sightings, bool none,
                                plr_frame_events *events, plr_report *report) {
     const bool makes = plr_births_are_allowed(f) && !(none && f->config.model == PLR_MODEL_BODY);
     uint8_t fate[PLR_MAX_OBSERVATIONS];
     if (makes)
-        choose_births(f, frame, n, fate);
-    for (unsigned k = 0; k < n; k++) {
-        const plr_observation *o = &frame->observations[f->work.order[k]];
+        choose_births(f, sightings, fate);
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_observation *o = sightings->at[k].seen;
         plr_landmark known;
-        if (f->work.slot_of[k] != PLR_NO_SLOT)
+        if (plr_is_matched(&sightings->at[k]))
             continue;
-        if (makes && events->left_out && plr_map_is_asked(f) && plr_map_ask(f, o->id, &known)) {
+        if (makes && events->left_out && plr_map_is_asked(&f->config, &f->map) &&
+            plr_map_ask(&f->map, o->id, &known)) {
             report->poor++; /* it keeps its place in the map, and is asked for again */
             continue;
         }
@@ -97,7 +102,8 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
             report->poor++;
             continue;
         }
-        if (fate[k] != BORN || !plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
+        if (fate[k] != BORN || !plr_slots_make_room(&f->belief, &f->camera, &f->motion, &f->map,
+                                                    &report->evicted, &events->sink_failed)) {
             report->no_room++;
             continue;
         }
@@ -108,41 +114,42 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
         report->poor = (uint16_t)(report->poor - report->no_room);
 }
 
-void plr_births_drop_rejected(plr_filter *f, const plr_frame *frame, unsigned n) {
-    plr_workspace *w = &f->work;
-    for (unsigned k = 0; k < n; k++) {
-        const bool was_rejected =
-            w->slot_of[k] != PLR_NO_SLOT && !plr_gate_accepted(f, w->slot_of[k]);
-        if (was_rejected)
-            plr_slots_remove(f, plr_slots_find(f, frame->observations[w->order[k]].id));
+void plr_births_drop_rejected(plr_filter *f, plr_sightings *sightings) {
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_sighting *row = &sightings->at[k];
+        if (plr_is_matched(row) && !plr_gate_accepted(row))
+            plr_slots_remove(&f->belief, plr_slots_find(&f->belief, row->seen->id));
     }
-    for (unsigned k = 0; k < n; k++)
-        w->slot_of[k] = plr_slots_find(f, frame->observations[w->order[k]].id);
+    for (unsigned k = 0; k < sightings->count; k++)
+        sightings->at[k].slot = plr_slots_find(&f->belief, sightings->at[k].seen->id);
 }
 
-void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
-                        const plr_report *report) {
-    plr_workspace *w = &f->work;
+plr_status plr_births_restart(plr_filter *f, const plr_sightings *sightings,
+                              const plr_report *report) {
     const bool agrees = 2 * report->gated < report->matched;
     if (f->config.model != PLR_MODEL_BODY || !plr_births_are_allowed(f))
-        return;
-    for (unsigned k = 0; k < n; k++) {
-        const plr_observation *o = &frame->observations[w->order[k]];
-        if (w->slot_of[k] == PLR_NO_SLOT || plr_gate_accepted(f, w->slot_of[k]))
+        return PLR_OK;
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_sighting *row = &sightings->at[k];
+        if (!plr_is_matched(row) || plr_gate_accepted(row))
             continue;
-        const unsigned slot = plr_slots_find(f, o->id); /* a restart may have moved others */
-        const plr_slot before = f->slots[slot];
-        const bool lost = w->verdict[w->slot_of[k]] == PLR_GATE_LOST;
+        const unsigned slot =
+            plr_slots_find(&f->belief, row->seen->id); /* a restart may have moved others */
+        const plr_slot before = f->belief.slots[slot];
+        const bool lost = row->verdict == PLR_GATE_LOST;
         if (!lost && !(agrees && plr_track_may_restart(&before)))
             continue;
-        const bool makes = plr_stereo_makes_landmark(f, o);
+        const bool makes = plr_stereo_makes_landmark(&f->belief, &f->camera, row->seen);
         if (!lost && !makes)
             continue;
-        plr_predict_apply_prior(f);
-        plr_slots_remove(f, slot);
+        const plr_status status = plr_predict_apply_prior(f);
+        if (status != PLR_OK)
+            return status;
+        plr_slots_remove(&f->belief, slot);
         if (!makes)
             continue;
-        append_new(f, o);
-        plr_track_restart(&f->slots[f->count - 1], &before);
+        append_new(f, row->seen);
+        plr_track_restart(&f->belief.slots[f->belief.count - 1], &before);
     }
+    return PLR_OK;
 }

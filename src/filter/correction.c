@@ -3,17 +3,20 @@
 
 #include <string.h>
 
+#include "filter/filter_internal.h"
 #include "math/dense.h"
 #include "math/log_product.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
 #include "process/velocity.h"
+#include "sensor/kept.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
 #include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/pose.h"
+#include "state/sightings.h"
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
 /* The columns of a batch's E. They make whole tiles of rows of the product, and at most one more, or this
@@ -24,10 +27,11 @@ enum {
     BESIDE_Y = PLR_POSE_DIM - 1
 }; /* the sensitivity's columns in the block of six that y begins */
 
-/* All measurements of a correction, in their order. After those of its arguments come two of the
- * biases. */
+/* All measurements of a correction, in their order: rows of a frame, the given ones, and two of the biases. */
 typedef struct plr_sensed {
-    unsigned seen, count; /* observations that were kept; with the given ones */
+    const plr_sightings *frame;
+    unsigned next;        /* row of the frame */
+    unsigned seen, count; /* rows that are used; with the given ones */
     const plr_measurement *given;
 } plr_sensed;
 
@@ -42,16 +46,16 @@ typedef struct plr_batch {
 } plr_batch;
 
 /* The sums behind a plr_innovation. */
-typedef struct plr_evidence {
+typedef struct plr_likelihood {
     plr_real d2;
     plr_log_product det_root; /* of S */
     unsigned rows;
-} plr_evidence;
+} plr_likelihood;
 
 /* Adds an applied batch, whose S = U^T U has been factorised, and y = U^-T (r - H dx): by the chain
  * rule, its innovation given the batches before, and given the motion's noise where that is kept
  * beside P. */
-static void add_evidence(plr_evidence *e, const plr_batch *batch) {
+static void add_likelihood(plr_likelihood *e, const plr_batch *batch) {
     for (unsigned r = 0; r < batch->rows; r++) {
         const plr_real y = batch->E[WIDE * r + OF_DX];
         e->d2 = PLR_FMA(y, y, e->d2);
@@ -63,8 +67,8 @@ static void add_evidence(plr_evidence *e, const plr_batch *batch) {
 /* Takes the motion's noise into account, once its Lambda = U^T U has been factorised, with its
  * estimate nu: with the information of the batches and the prior N(0, I), linearised at z,
  * d2 = |z|^2 + sum |y|^2 - |U (nu - z)|^2 and det S = det Lambda prod det S_k. */
-static void add_evidence_of_motion(plr_evidence *e, const plr_noise *noise,
-                                   const plr_real nu[PLR_POSE_DIM]) {
+static void add_likelihood_of_motion(plr_likelihood *e, const plr_noise *noise,
+                                     const plr_real nu[PLR_POSE_DIM]) {
     e->d2 += plr_norm2_of_6(noise->z);
     for (unsigned r = 0; r < PLR_POSE_DIM; r++) {
         const plr_real *row = noise->Lambda + plr_upper_row(PLR_POSE_DIM, r);
@@ -76,16 +80,24 @@ static void add_evidence_of_motion(plr_evidence *e, const plr_noise *noise,
     }
 }
 
-/* Measurement number i. */
+/* The slot of the next row that is used. */
+static unsigned next_slot(plr_sensed *sensed) {
+    while (!sensed->frame->at[sensed->next].used)
+        sensed->next++;
+    PLR_ASSERT(sensed->next < sensed->frame->count);
+    return sensed->frame->at[sensed->next++].slot;
+}
+
+/* Measurement number i, of an observation of the landmark in this slot. */
 static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsigned i,
-                            plr_measurement *m) {
+                            unsigned slot, plr_measurement *m) {
     if (i < sensed->seen) {
-        plr_measurement_recall(f, f->work.slot_of[f->work.used[i]], m);
+        plr_measurement_recall(&f->belief, &f->work, slot, m);
     } else if (i < sensed->count) {
         *m = sensed->given[i - sensed->seen];
     } else {
         memset(m, 0, sizeof *m);
-        plr_velocity_bias_rows(f, i - sensed->count, &m->H, m->r);
+        plr_velocity_bias_rows(&f->belief, &f->source, i - sensed->count, &m->H, m->r);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             m->R[r] = 1;
     }
@@ -94,7 +106,7 @@ static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsig
 /* Columns of a batch's E, in whole tiles, those behind the sensitivity's being zero; but a last one that
  * would be alone in its tile stays so. */
 static unsigned whole_tiles(const plr_filter *f) {
-    const plr_calibrated *errors = &f->par.calibrated;
+    const plr_error_columns *errors = &f->camera.errors;
     const unsigned least = plr_calibration_estimated(errors) > 0 ? BESIDE_Y : 0;
     const unsigned columns = (unsigned)OF_S + (errors->count > least ? errors->count : least);
     return columns % TILE == 1 ? columns : (columns + TILE - 1) / TILE * TILE;
@@ -102,16 +114,16 @@ static unsigned whole_tiles(const plr_filter *f) {
 
 /* A column of the sensitivity (state/sensitivity.h) is corrected as dx is, with -H_s in the place of
  * the residual: by how much the error of the calibration changes what is predicted. */
-static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, unsigned i,
-                              const plr_rows *H, plr_batch *batch, unsigned first) {
+static void stack_sensitivity(const plr_filter *f, bool seen, unsigned slot, const plr_rows *H,
+                              plr_batch *batch, unsigned first) {
     plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS], column[PLR_ROWS];
-    memset(H_s, 0, f->par.calibrated.count * sizeof *H_s);
-    if (i < sensed->seen && f->par.calibrated.count > 0)
-        plr_stereo_by_calibration(f, f->work.slot_of[f->work.used[i]], H_s);
+    memset(H_s, 0, f->camera.errors.count * sizeof *H_s);
+    if (seen && f->camera.errors.count > 0)
+        plr_stereo_by_calibration(&f->belief, &f->camera, slot, H_s);
     for (unsigned k = 0; OF_S + k < whole_tiles(f); k++) {
-        const bool has_column = k < f->par.calibrated.count;
+        const bool has_column = k < f->camera.errors.count;
         if (has_column)
-            plr_rows_apply(H, f->S[k], column);
+            plr_rows_apply(H, f->belief.S[k], column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             batch->E[WIDE * (first + r) + OF_S + k] = has_column ? H_s[k][r] + column[r] : PLR_R(0);
     }
@@ -123,7 +135,7 @@ static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_b
     plr_workspace *w = &f->work;
     PLR_ASSERT(first + PLR_ROWS <= batch->rows);
     plr_real column[PLR_ROWS];
-    plr_covariance_project(f, &m->H, w->Vt + first * batch->ld, batch->ld);
+    plr_covariance_project(&f->belief, &m->H, w->Vt + first * batch->ld, batch->ld);
     plr_real *S = batch->S + first; /* element (i, first) */
     for (unsigned i = 0; i < first; i++) {
         plr_rows_apply(&m->H, w->Vt + i * batch->ld, S);
@@ -182,7 +194,7 @@ static void add_noise_information(plr_filter *f, const plr_batch *batch) {
     plr_noise *noise = &f->work.noise;
     add_squares(batch, OF_W, noise->Lambda);
     project(batch, OF_W, OF_DX, noise->eta);
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
+    for (unsigned k = 0; k < f->camera.errors.count; k++)
         project(batch, OF_W, OF_S + k, noise->eta_of_S[k]);
 }
 
@@ -197,7 +209,7 @@ static void add_learnt(plr_filter *f, const plr_batch *batch) {
         for (unsigned l = k; l < BESIDE_Y; l++)
             to->J[PLR_CALIBRATIONS * k + l] += *sum++;
     }
-    for (unsigned k = BESIDE_Y; k < PLR_CALIBRATIONS && k < f->par.calibrated.count; k++) {
+    for (unsigned k = BESIDE_Y; k < PLR_CALIBRATIONS && k < f->camera.errors.count; k++) {
         plr_real less[PLR_POSE_DIM] = {0};
         project(batch, OF_DX, OF_S + k, less);
         to->eta[k] += less[0];
@@ -218,7 +230,7 @@ static void update_estimate(plr_filter *f, const plr_batch *batch) {
         rows[OF_W + k] = w->noise.Wt + k * batch->ld;
     rows[OF_DX] = w->dx;
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
-        rows[OF_S + k] = f->S[k];
+        rows[OF_S + k] = f->belief.S[k];
     for (unsigned k = w->noise.open ? 0 : TILE; k + TILE <= used; k += TILE)
         plr_subtract_four_rows(batch->ld, batch->rows, batch->E + k, WIDE, w->Vt, batch->ld,
                                rows + k);
@@ -240,39 +252,42 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
         return false;
     plr_solve_upper_transposed(batch->rows, batch->ld, batch->S, w->Vt, batch->ld);
     plr_solve_upper_transposed(batch->rows, whole_tiles(f), batch->S, batch->E, WIDE);
-    if (!plr_covariance_subtract(f, batch->rows))
+    if (!plr_covariance_subtract(&f->belief, f->work.Vt, batch->rows))
         return false;
     if (w->noise.open)
         add_noise_information(f, batch);
-    if (plr_calibration_estimated(&f->par.calibrated) > 0)
+    if (plr_calibration_estimated(&f->camera.errors) > 0)
         add_learnt(f, batch);
     update_estimate(f, batch);
     return true;
 }
 
 /* Applies `size` measurements, from number `at` on. */
-static void correct_by_batch(plr_filter *f, const plr_sensed *sensed, unsigned at, unsigned size,
-                             plr_correction *result, plr_evidence *evidence) {
+static plr_status correct_by_batch(plr_filter *f, plr_sensed *sensed, unsigned at, unsigned size,
+                                   plr_correction *result, plr_likelihood *likelihood) {
     PLR_ASSERT(0 < size && size <= PLR_BLOCK_OBSERVATIONS);
     plr_batch batch; /* not initialised: that would cost as much as a row of S */
     bool factorised;
     batch.rows = PLR_ROWS * size;
-    batch.ld = plr_covariance_ld(f);
+    batch.ld = plr_covariance_ld(&f->belief);
     for (unsigned i = 0; i < size; i++) {
         plr_measurement m;
-        get_measurement(f, sensed, at + i, &m);
+        const bool seen = at + i < sensed->seen;
+        const unsigned slot = seen ? next_slot(sensed) : 0;
+        get_measurement(f, sensed, at + i, slot, &m);
         stack(f, &m, PLR_ROWS * i, &batch);
-        stack_sensitivity(f, sensed, at + i, &m.H, &batch, PLR_ROWS * i);
+        stack_sensitivity(f, seen, slot, &m.H, &batch, PLR_ROWS * i);
     }
     if (apply_batch(f, &batch, &factorised)) {
         for (unsigned i = at; i < at + size; i++)
             result->applied += i < sensed->count;
-        add_evidence(evidence, &batch);
+        add_likelihood(likelihood, &batch);
     } else if (!factorised) {
         result->failed_batches++;
     } else {
-        plr_filter_diverge(f);
+        return plr_filter_diverge(f);
     }
+    return PLR_OK;
 }
 
 /* True if the correction is finite and small enough for a retraction. */
@@ -283,66 +298,88 @@ static bool is_applicable(const plr_filter *f, unsigned n) {
     return plr_pose_is_correction(f->work.dx);
 }
 
-/* Corrects the estimate by work.dx, and P with it. Returns plr_correction.cut. */
-static unsigned move_estimate(plr_filter *f, unsigned n) {
-    PLR_ASSERT(n == plr_covariance_dim(f));
-    if (!is_applicable(f, n)) {
-        plr_filter_diverge(f);
-        return 0;
-    }
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
+/* Corrects the estimate by work.dx, and P with it. *cut: as in plr_correction. */
+static plr_status move_estimate(plr_filter *f, unsigned n, unsigned *cut) {
+    PLR_ASSERT(n == plr_covariance_dim(&f->belief));
+    *cut = 0;
+    if (!is_applicable(f, n))
+        return plr_filter_diverge(f);
+    if (plr_has_block(&f->belief, PLR_BLOCK_BIAS))
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-            f->bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+            f->belief.bias[i] += f->work.dx[plr_row_of(&f->belief, PLR_BLOCK_BIAS) + i];
+    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY))
         for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
-            f->inertial.velocity[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_VELOCITY) + i];
-    plr_velocity_forget_bias(f);
-    const unsigned cut = plr_model_of(f)->retract(f, f->work.dx);
-    plr_pose_correct(f, f->work.dx);
-    plr_covariance_make_up_for_rounding(f);
-    if (!plr_covariance_is_positive(f))
-        plr_filter_diverge(f);
-    return cut;
+            f->belief.velocity[i] += f->work.dx[plr_row_of(&f->belief, PLR_BLOCK_VELOCITY) + i];
+    plr_velocity_forget_bias(&f->source);
+    *cut = plr_model_of(&f->belief)->retract(&f->belief, &f->camera, &f->work, f->work.dx);
+    plr_pose_correct(&f->belief, f->work.dx);
+    plr_covariance_make_up_for_rounding(&f->belief);
+    return plr_covariance_is_positive(&f->belief) ? PLR_OK : plr_filter_diverge(f);
 }
 
-plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *given,
+/* Applies all measurements, in batches of like size: the cost grows with its square. Those after one that
+ * diverges are left out. */
+static plr_status correct_by_all(plr_filter *f, plr_sensed *sensed, plr_correction *result,
+                                 plr_likelihood *likelihood) {
+    const unsigned all =
+        sensed->count + (plr_velocity_informs_bias(&f->source) ? BIAS_MEASUREMENTS : 0);
+    unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
+    plr_status status = PLR_OK;
+    for (; batches > 0 && status == PLR_OK; batches--) {
+        const unsigned size = (all - at + batches - 1) / batches;
+        status = correct_by_batch(f, sensed, at, size, result, likelihood);
+        at += size;
+    }
+    return status;
+}
+
+/* The first that is not good. */
+static plr_status first_of(plr_status a, plr_status b) {
+    return a != PLR_OK ? a : b;
+}
+
+static unsigned count_used(const plr_sightings *frame) {
+    unsigned used = 0;
+    for (unsigned k = 0; frame && k < frame->count; k++) {
+        PLR_ASSERT(!frame->at[k].used || plr_is_matched(&frame->at[k]));
+        used += frame->at[k].used;
+    }
+    return used;
+}
+
+plr_correction plr_correct(plr_filter *f, const plr_sightings *frame, const plr_measurement *given,
                            unsigned count) {
-    plr_correction result = {0};
-    const plr_sensed sensed = {seen, seen + count, given};
-    const unsigned n = plr_covariance_dim(f);
+    plr_correction result = {.status = PLR_OK};
+    const unsigned seen = count_used(frame), n = plr_covariance_dim(&f->belief);
+    plr_sensed sensed = {frame, 0, seen, seen + count, given};
     if (!f->work.noise.open) { /* no motion has been applied */
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
         memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     }
-    plr_calibration_begin(f);
-    plr_evidence evidence = {.det_root = {1, 0}};
-    const unsigned all = sensed.count + (plr_velocity_informs_bias(f) ? BIAS_MEASUREMENTS : 0);
-    unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
-    for (; batches > 0 && !f->diverged; batches--) {
-        const unsigned size =
-            (all - at + batches - 1) / batches; /* of like size: the cost grows with its square */
-        correct_by_batch(f, &sensed, at, size, &result, &evidence);
-        at += size;
-    }
+    plr_calibration_begin(&f->camera, &f->work.learnt);
+    plr_likelihood likelihood = {.det_root = {1, 0}};
+    const bool informed = plr_velocity_informs_bias(&f->source);
+    result.status = correct_by_all(f, &sensed, &result, &likelihood);
     result.moved = f->work.noise.open;
     memcpy(result.Lambda, f->work.noise.Lambda, sizeof result.Lambda);
-    plr_covariance_close_noise(f, result.nu);
-    plr_calibration_learn(f);
+    result.status = first_of(result.status, plr_filter_close_noise(f, result.nu));
+    plr_calibration_learn(&f->belief, &f->camera, &f->work);
     if (result.moved)
-        add_evidence_of_motion(&evidence, &f->work.noise, result.nu);
-    result.innovation.d2 = evidence.d2;
-    result.innovation.log_det = 2 * plr_log_product_value(&evidence.det_root);
-    result.innovation.rows = evidence.rows;
-    if (result.applied == 0 && !result.moved && all == sensed.count)
+        add_likelihood_of_motion(&likelihood, &f->work.noise, result.nu);
+    result.innovation.d2 = likelihood.d2;
+    result.innovation.log_det = 2 * plr_log_product_value(&likelihood.det_root);
+    result.innovation.rows = likelihood.rows;
+    if (result.applied == 0 && !result.moved && !informed)
         return result;
-    result.cut = move_estimate(f, n);
+    result.status = first_of(result.status, move_estimate(f, n, &result.cut));
     return result;
 }
 
-void plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
-    const unsigned n = plr_covariance_dim(f);
-    if (!plr_covariance_shift(f, xi, f->work.dx))
-        return;
+plr_status plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
+    const unsigned n = plr_covariance_dim(&f->belief);
+    unsigned cut;
+    if (!plr_covariance_shift(&f->belief, xi, f->work.dx))
+        return PLR_OK;
     memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
-    (void)move_estimate(f, n);
+    return move_estimate(f, n, &cut);
 }

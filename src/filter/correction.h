@@ -16,6 +16,7 @@ typedef struct plr_innovation {
 
 /* The result of a correction. */
 typedef struct plr_correction {
+    plr_status status;         /* PLR_OK or PLR_E_DIVERGED */
     unsigned applied;          /* measurements in batches that were applied */
     unsigned failed_batches;   /* left out: S could not be factorised */
     unsigned cut;              /* landmark corrections limited: PLR_REASON_RANGE_LIMITED */
@@ -26,18 +27,18 @@ typedef struct plr_correction {
     bool moved;                /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 
-/* Applies the measurements that were kept (sensor/measurement.h) of the first `seen` observations in
- * work.used, then the `given` ones, and the information about the biases that velocities have added
- * since the last correction (process/velocity.h). All are linearised at the current estimate, and
- * the estimate is corrected once, at the end. If a variance would not be positive or the correction
- * is not finite, the filter is marked as diverged and keeps the result of the batches before. */
-plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *given,
+/* Applies the measurements that were kept (sensor/kept.h) of the rows of a frame that are to be
+ * used, then the `given` ones, and the information about the biases that velocities have added since the
+ * last correction (process/velocity.h). All are linearised at the current estimate, and the estimate is
+ * corrected once, at the end. PLR_E_DIVERGED if a variance would not be positive or the correction is not
+ * finite; the result of the batches before is kept. `frame` or `given` may be NULL. */
+plr_correction plr_correct(plr_filter *f, const plr_sightings *frame, const plr_measurement *given,
                            unsigned count);
 
 /* T <- T Exp(xi), and everything else as it is expected to be if the pose is there: x <- x + g with
  * g = P_xp P_pp^-1 xi. P grows by g g^T, so that the estimate of before is one sigma away. Nothing
  * happens if P_pp cannot be factorised. For a pose that was found otherwise, where what is seen shall
- * be linearised; no motion may be pending. */
-void plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
+ * be linearised; no motion may be pending. PLR_E_DIVERGED as above. */
+plr_status plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
 
 #endif

@@ -75,21 +75,21 @@ static plr_status tell_covariance(double *told, const plr_real P[PLR_POSE_SQUARE
 /* The pose's covariance now, enlarged by what the calibration may be wrong, and while vision
  * contradicts the twists. */
 static void pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
-    plr_motion_pose_covariance(f, P_xi);
-    plr_sensitivity_add_to_pose(f, P_xi);
+    plr_motion_pose_covariance(&f->belief, &f->motion, P_xi);
+    plr_sensitivity_add_to_pose(&f->belief, &f->camera, &f->motion, P_xi);
     plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P_xi);
 }
 
 plr_time_ns plr_filter_time(const plr_filter *f) {
-    return ready(f) ? f->t_ns : 0;
+    return ready(f) ? f->belief.t_ns : 0;
 }
 
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
     const plr_status sound = T_WB ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    to_double(T_WB->R, f->R_WB, 9);
-    memcpy(T_WB->p, f->p_WB, sizeof T_WB->p);
+    to_double(T_WB->R, f->belief.R_WB, 9);
+    memcpy(T_WB->p, f->belief.p_WB, sizeof T_WB->p);
     plr_extrinsics_pose_out(f, T_WB);
     return PLR_OK;
 }
@@ -98,8 +98,6 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
     const plr_status sound = P_xi ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     plr_real P[PLR_POSE_SQUARE];
     pose_covariance(f, P);
     plr_extrinsics_covariance_out(f, P);
@@ -111,7 +109,7 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
     if (sound != PLR_OK)
         return sound;
     plr_real u[PLR_POSE_DIM];
-    plr_process_of(f)->now(f, u, NULL);
+    plr_process_of(&f->source)->now(&f->belief, &f->motion, &f->source, u, NULL);
     plr_extrinsics_twist_out(f, u, NULL);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         if (!plr_is_finite(u[i]))
@@ -125,11 +123,9 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     const plr_status sound = P_u ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
-    plr_process_of(f)->now(f, u, P);
-    plr_sensitivity_add_to_velocity(f, P);
+    plr_process_of(&f->source)->now(&f->belief, &f->motion, &f->source, u, P);
+    plr_sensitivity_add_to_velocity(&f->belief, &f->camera, &f->motion, P);
     plr_extrinsics_twist_out(f, u, P);
     return tell_covariance(P_u, P);
 }
@@ -138,41 +134,41 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     const plr_status sound = b ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged && P_b)
-        return PLR_E_DIVERGED;
     if (P_b) {
         plr_real P[PLR_POSE_SQUARE];
-        plr_process_of(f)->bias_covariance(f, P);
-        if (plr_has_block(f, PLR_BLOCK_BIAS))
-            plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM, P);
+        plr_process_of(&f->source)->bias_covariance(&f->belief, &f->motion, &f->source, P);
+        if (plr_has_block(&f->belief, PLR_BLOCK_BIAS))
+            plr_sensitivity_add_to(&f->belief, &f->camera, plr_row_of(&f->belief, PLR_BLOCK_BIAS),
+                                   PLR_BIAS_DIM, P);
         const plr_status status = tell_covariance(P_b, P);
         if (status != PLR_OK)
             return status;
     }
-    to_double(b, f->bias, PLR_POSE_DIM);
+    to_double(b, f->belief.bias, PLR_POSE_DIM);
     return PLR_OK;
 }
 
 plr_status plr_filter_calibration(const plr_filter *f, plr_calibration_result *result) {
     const plr_status sound = result ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound == PLR_OK)
-        plr_calibration_tell(f, result);
+        plr_calibration_tell(&f->belief, &f->camera, &f->source, result);
     return sound;
 }
 
 double plr_filter_trace(const plr_filter *f) {
-    if (plr_guard_check_whole(f) != PLR_OK || f->diverged)
+    if (plr_guard_check_whole(f) != PLR_OK)
         return 0;
     plr_real P[PLR_POSE_SQUARE], P_b[PLR_POSE_SQUARE] = {0};
-    double trace = plr_covariance_trace(f);
-    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P); /* replaced by the present one */
+    double trace = plr_covariance_trace(&f->belief);
+    plr_covariance_get(&f->belief, PLR_BLOCK_POSE, PLR_BLOCK_POSE,
+                       P); /* replaced by the present one */
     for (int i = 0; i < PLR_POSE_DIM; i++)
         trace -= (double)P[(PLR_POSE_DIM + 1) * i];
     pose_covariance(f, P);
-    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
+    if (plr_has_block(&f->belief, PLR_BLOCK_BIAS)) {
         plr_real before[PLR_POSE_SQUARE];
-        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before);
-        plr_process_of(f)->bias_covariance(f, P_b);
+        plr_covariance_get(&f->belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before);
+        plr_process_of(&f->source)->bias_covariance(&f->belief, &f->motion, &f->source, P_b);
         for (int i = 0; i < PLR_POSE_DIM; i++)
             trace += (double)P_b[(PLR_POSE_DIM + 1) * i] - (double)before[(PLR_POSE_DIM + 1) * i];
     }

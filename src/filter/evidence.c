@@ -14,7 +14,7 @@
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
-#include "state/slots.h"
+#include "state/sightings.h"
 #include "supervise/supervise.h"
 
 /* A hash of an observation's four pixel coordinates. */
@@ -30,13 +30,14 @@ static uint32_t hash_of_pixels(const plr_observation *o) {
     return hash;
 }
 
-void plr_evidence_of_picture(plr_filter *f, const plr_frame *frame, unsigned n) {
-    plr_picture_evidence *e = &f->work.evidence.picture;
-    for (unsigned k = 0; k < n; k++) {
-        if (f->work.slot_of[k] == PLR_NO_SLOT)
+void plr_evidence_of_picture(plr_filter *f, const plr_sightings *sightings) {
+    plr_picture_evidence *e = &f->evidence.picture;
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_sighting *row = &sightings->at[k];
+        if (!plr_is_matched(row))
             continue;
-        plr_slot *slot = &f->slots[f->work.slot_of[k]];
-        const uint32_t hash = hash_of_pixels(&frame->observations[f->work.order[k]]);
+        plr_slot *slot = plr_slot_of(&f->belief, row);
+        const uint32_t hash = hash_of_pixels(row->seen);
         e->matched++;
         e->same += slot->pixel_hash == hash;
         slot->pixel_hash = hash;
@@ -45,14 +46,14 @@ void plr_evidence_of_picture(plr_filter *f, const plr_frame *frame, unsigned n) 
 }
 
 void plr_evidence_note_pose(const plr_filter *f, plr_evidence_pose *pose) {
-    memcpy(pose->R_WB, f->R_WB, sizeof pose->R_WB);
-    memcpy(pose->p_WB, f->p_WB, sizeof pose->p_WB);
+    memcpy(pose->R_WB, f->belief.R_WB, sizeof pose->R_WB);
+    memcpy(pose->p_WB, f->belief.p_WB, sizeof pose->p_WB);
 }
 
 void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
                             const plr_applied_motion *stated, const plr_motion_first *first,
                             const plr_correction *correction) {
-    plr_motion_evidence *e = &f->work.evidence.motion;
+    plr_motion_evidence *e = &f->evidence.motion;
     e->applied = true;
     e->outright = first->outright;
     memcpy(e->E, first->motion.E, sizeof e->E);
@@ -62,56 +63,64 @@ void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
     plr_mat6_vec(e->nu, first->motion.L, correction->nu);
     plr_motion_solve(stated->L, 1, e->nu, 1);
     memcpy(e->Lambda, correction->Lambda, sizeof e->Lambda);
-    plr_pose_moved_from(f, by_odometry->R_WB, by_odometry->p_WB, e->moved);
+    plr_pose_moved_from(&f->belief, by_odometry->R_WB, by_odometry->p_WB, e->moved);
 }
 
-bool plr_evidence_before_map(plr_filter *f, unsigned n, plr_evidence_pose *before) {
-    plr_map_evidence *e = &f->work.evidence.map;
-    for (unsigned k = 0; k < n; k++)
-        e->known += f->work.slot_of[k] != PLR_NO_SLOT && f->slots[f->work.slot_of[k]].known;
+bool plr_evidence_before_map(plr_filter *f, const plr_sightings *sightings,
+                             plr_evidence_pose *before) {
+    plr_map_evidence *e = &f->evidence.map;
+    for (unsigned k = 0; k < sightings->count; k++)
+        e->known += plr_is_of_known(&f->belief, &sightings->at[k]);
     if (e->known == 0 || f->config.model != PLR_MODEL_BODY)
         return false;
     plr_evidence_note_pose(f, before);
-    plr_motion_pose_covariance(f, e->P_before);
+    plr_motion_pose_covariance(&f->belief, &f->motion, e->P_before);
     return true;
 }
 
 void plr_evidence_after_map(plr_filter *f, const plr_evidence_pose *before) {
-    plr_map_evidence *e = &f->work.evidence.map;
-    e->adopted = f->work.evidence.events.adopted;
-    memcpy(e->R_WB, f->R_WB, sizeof e->R_WB);
-    plr_pose_moved_from(f, before->R_WB, before->p_WB, e->moved);
-    plr_motion_pose_covariance(f, e->P_after);
-    plr_sensitivity_add_to_pose(f, e->calibration);
+    plr_map_evidence *e = &f->evidence.map;
+    e->adopted = f->evidence.events.adopted;
+    memcpy(e->R_WB, f->belief.R_WB, sizeof e->R_WB);
+    plr_pose_moved_from(&f->belief, before->R_WB, before->p_WB, e->moved);
+    plr_motion_pose_covariance(&f->belief, &f->motion, e->P_after);
+    plr_sensitivity_add_to_pose(&f->belief, &f->camera, &f->motion, e->calibration);
 }
 
 static void add_biases(plr_filter *f, plr_bias_evidence *e) {
     plr_real P[PLR_POSE_SQUARE];
-    e->estimated = plr_has_block(f, PLR_BLOCK_BIAS);
+    e->estimated = plr_has_block(&f->belief, PLR_BLOCK_BIAS);
     if (!e->estimated)
         return;
-    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
+    plr_covariance_get(&f->belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
-        e->off[k] = f->bias[k] - f->bias_prior[k];
-        e->prior[k] = plr_bias_prior_variance(f, k);
+        e->off[k] = f->belief.bias[k] - f->source.bias_prior[k];
+        e->prior[k] = plr_bias_prior_variance(&f->source, k);
         e->variance[k] = P[(PLR_BIAS_DIM + 1) * k];
     }
 }
 
-void plr_evidence_complete(plr_filter *f) {
-    plr_frame_evidence *e = &f->work.evidence;
+void plr_evidence_complete(plr_filter *f, plr_sightings *sightings) {
+    plr_frame_evidence *e = &f->evidence;
+    for (unsigned k = 0; k < sightings->count; k++)
+        if (plr_gate_rejected(&sightings->at[k]))
+            sightings->at[k].slot = plr_slots_find(&f->belief, sightings->at[k].seen->id);
     add_biases(f, &e->bias);
-    e->events.miscalibrated = plr_calibration_is_off(f);
+    e->events.miscalibrated = plr_calibration_is_off(&f->camera);
     e->has_gate = f->par.gate_d2 > 0 || f->par.gate_residual2 > 0;
-    e->readings = plr_filter_readings_at(f, f->t_ns);
+    e->readings = plr_filter_readings_at(f, f->belief.t_ns);
 }
 
 /* ---------------------------------------------------------------- what is told of it */
 
 static plr_rejection why(const plr_filter *f, unsigned slot) {
-    if (f->slots[slot].moving)
+    const plr_sightings *frame = &f->work.sightings;
+    if (f->belief.slots[slot].moving)
         return PLR_REJECTED_MOVES;
-    return f->work.verdict[slot] == PLR_GATE_FAR ? PLR_REJECTED_FAR : PLR_REJECTED_BY_GATE;
+    for (unsigned k = 0; k < frame->count; k++)
+        if (frame->at[k].slot == slot && frame->at[k].verdict == PLR_GATE_FAR)
+            return PLR_REJECTED_FAR;
+    return PLR_REJECTED_BY_GATE;
 }
 
 /* Puts a landmark among those of the largest mean2. */
@@ -130,11 +139,11 @@ plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *told) {
         return sound;
     if (f->totals.frames == 0)
         return PLR_E_NOT_READY;
-    plr_supervise_tell(&f->supervisor, &f->work.evidence, told);
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const plr_slot *s = &f->slots[slot];
+    plr_supervise_tell(&f->supervisor, &f->evidence, told);
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        const plr_slot *s = &f->belief.slots[slot];
         const plr_real variance = s->innovation_variance;
-        if (s->last_frame != f->frame_number || s->rejected == 0)
+        if (s->last_frame != f->belief.frame_number || s->rejected == 0)
             continue;
         insert(told,
                (plr_rejected_landmark){

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What the supervisor is told of a frame (pelorus/supervisor.h), in work.evidence. */
+/* What the supervisor is told of a frame (pelorus/supervisor.h), in evidence. */
 #ifndef PLR_FILTER_EVIDENCE_H
 #define PLR_FILTER_EVIDENCE_H
 
@@ -16,8 +16,8 @@ typedef struct plr_evidence_pose {
     double p_WB[3];
 } plr_evidence_pose;
 
-/* How many of the n observations show the very pixels of last time, and the motion since. */
-void plr_evidence_of_picture(plr_filter *f, const plr_frame *frame, unsigned n);
+/* How many observations show the very pixels of last time, and the motion since. */
+void plr_evidence_of_picture(plr_filter *f, const plr_sightings *sightings);
 
 void plr_evidence_note_pose(const plr_filter *f, plr_evidence_pose *pose);
 
@@ -27,12 +27,14 @@ void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
                             const plr_applied_motion *stated, const plr_motion_first *first,
                             const plr_correction *correction);
 
-/* Before the correction by a frame of n observations: true if it sees known landmarks, and `before` is
- * filled. After it: what they did to the pose. */
-bool plr_evidence_before_map(plr_filter *f, unsigned n, plr_evidence_pose *before);
+/* Before the correction by a frame: true if it sees known landmarks, and `before` is filled. After it: what
+ * they did to the pose. */
+bool plr_evidence_before_map(plr_filter *f, const plr_sightings *sightings,
+                             plr_evidence_pose *before);
 void plr_evidence_after_map(plr_filter *f, const plr_evidence_pose *before);
 
-/* At the end of a frame: biases and readings. */
-void plr_evidence_complete(plr_filter *f);
+/* At the end of a frame: biases and readings; and rows that the gate rejected find their landmarks again,
+ * which births may have moved, for plr_filter_supervision. */
+void plr_evidence_complete(plr_filter *f, plr_sightings *sightings);
 
 #endif

@@ -8,23 +8,23 @@
 #include "math/so3.h"
 
 static bool has_arm(const plr_filter *f) {
-    return plr_dot3(f->par.imu_arm, f->par.imu_arm) > 0;
+    return plr_dot3(f->source.imu_arm, f->source.imu_arm) > 0;
 }
 
-void plr_extrinsics_set(plr_parameters *par, const plr_config *config) {
+void plr_extrinsics_set(plr_filter *f, const plr_config *config) {
     plr_real turn[3], moved[3];
-    plr_mat3_identity(par->R_BI);
-    memset(par->imu_arm, 0, sizeof par->imu_arm);
+    plr_mat3_identity(f->source.R_BI);
+    memset(f->source.imu_arm, 0, sizeof f->source.imu_arm);
     if (config->process != PLR_PROCESS_IMU)
         return;
     for (int i = 0; i < 3; i++) {
-        par->imu_arm[i] = (plr_real)config->imu_arm_m[i];
+        f->source.imu_arm[i] = (plr_real)config->imu_arm_m[i];
         turn[i] = (plr_real)config->imu_turn_rad[i];
     }
-    plr_so3_exp(par->R_BI, turn);
-    plr_mat3_vec(moved, par->camera.R_CB, par->imu_arm);
+    plr_so3_exp(f->source.R_BI, turn);
+    plr_mat3_vec(moved, f->camera.given.R_CB, f->source.imu_arm);
     for (int i = 0; i < 3; i++)
-        par->camera.t_CB[i] += moved[i];
+        f->camera.given.t_CB[i] += moved[i];
 }
 
 /* P <- A P A^T, A = [I, s [r]x; 0, I]. */
@@ -43,7 +43,7 @@ static void shift(const plr_real r[3], plr_real s, plr_real P[PLR_POSE_SQUARE]) 
 static void move(const plr_filter *f, double sign, plr_pose *T) {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            T->p[i] += sign * T->R[3 * i + j] * (double)f->par.imu_arm[j];
+            T->p[i] += sign * T->R[3 * i + j] * (double)f->source.imu_arm[j];
 }
 
 void plr_extrinsics_pose_in(const plr_filter *f, plr_pose *T) {
@@ -57,7 +57,7 @@ void plr_extrinsics_covariance_in(const plr_filter *f, double P[PLR_POSE_SQUARE]
         return;
     for (int i = 0; i < PLR_POSE_SQUARE; i++)
         in_real[i] = (plr_real)P[i];
-    shift(f->par.imu_arm, -1, in_real);
+    shift(f->source.imu_arm, -1, in_real);
     for (int i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = (double)in_real[i];
 }
@@ -69,28 +69,28 @@ void plr_extrinsics_pose_out(const plr_filter *f, plr_pose *T) {
 
 void plr_extrinsics_covariance_out(const plr_filter *f, plr_real P[PLR_POSE_SQUARE]) {
     if (has_arm(f))
-        shift(f->par.imu_arm, 1, P);
+        shift(f->source.imu_arm, 1, P);
 }
 
 void plr_extrinsics_twist_out(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real *P) {
     plr_real by_turning[3];
     if (!has_arm(f))
         return;
-    plr_cross3(by_turning, f->par.imu_arm, u + 3);
+    plr_cross3(by_turning, f->source.imu_arm, u + 3);
     for (int i = 0; i < 3; i++)
         u[i] += by_turning[i];
     if (P)
-        shift(f->par.imu_arm, 1, P);
+        shift(f->source.imu_arm, 1, P);
 }
 
 void plr_extrinsics_place_in(const plr_filter *f, double at_B_m[3]) {
     for (int i = 0; i < 3 && has_arm(f); i++)
-        at_B_m[i] -= (double)f->par.imu_arm[i];
+        at_B_m[i] -= (double)f->source.imu_arm[i];
 }
 
 void plr_extrinsics_reading_in(const plr_filter *f, plr_real reading[PLR_POSE_DIM]) {
     plr_real turned[PLR_POSE_DIM];
-    plr_mat3_vec(turned, f->par.R_BI, reading);
-    plr_mat3_vec(turned + 3, f->par.R_BI, reading + 3);
+    plr_mat3_vec(turned, f->source.R_BI, reading);
+    plr_mat3_vec(turned + 3, f->source.R_BI, reading + 3);
     memcpy(reading, turned, sizeof turned);
 }

@@ -10,7 +10,7 @@
 #include "pelorus/filter.h"
 
 /* The arm, the turn and the camera seen from the IMU, at init. */
-void plr_extrinsics_set(plr_parameters *par, const plr_config *config);
+void plr_extrinsics_set(plr_filter *f, const plr_config *config);
 
 /* p <- p + R r: from the caller's origin to the IMU. Of a covariance of (rho, theta), 6x6:
  * rho <- rho - r x theta. */

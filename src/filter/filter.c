@@ -58,35 +58,53 @@ static plr_real squared(double x) {
     return (plr_real)(x * x);
 }
 
-static void set_parameters(plr_parameters *par, const plr_calibration *calibration,
-                           const plr_config *c) {
-    set_camera(&par->camera, calibration);
-    plr_extrinsics_set(par, c);
-    plr_se3_adjoint(par->Ad_CB, par->camera.R_CB, par->camera.t_CB);
-    par->pixel_variance = squared(c->pixel_sigma_px);
+static void set_camera_model(plr_camera_model *camera, const plr_calibration *calibration,
+                             const plr_config *c) {
+    set_camera(&camera->given, calibration);
+    camera->pixel_variance = squared(c->pixel_sigma_px);
+    camera->track_drift_variance = squared(c->track_drift_px);
+    camera->min_disparity = (plr_real)c->min_disparity_px;
+    camera->max_row_gap = (plr_real)c->max_row_gap_px;
+    camera->min_depth = (plr_real)c->min_depth_m;
+    camera->max_depth = (plr_real)c->max_depth_m;
+    camera->min_inverse_range = (plr_real)(1 / c->max_range_m);
+    camera->landmark_variance = squared(c->landmark_sigma_m);
+    camera->landmark_prior = c->landmark_prior;
+    plr_calibration_lay_out(&camera->errors, c);
+}
+
+static void set_source(plr_source *source, const plr_config *c) {
     for (int i = 0; i < 3; i++) {
-        par->velocity_variance[i] = squared(c->velocity_sigma[i]);
-        par->gyro_variance[i] = squared(c->gyro_sigma[i]);
+        source->velocity_variance[i] = squared(c->velocity_sigma[i]);
+        source->gyro_variance[i] = squared(c->gyro_sigma[i]);
     }
-    par->bias_velocity_walk = (plr_real)c->bias_velocity_walk;
-    par->bias_gyro_walk = (plr_real)c->bias_gyro_walk;
-    par->gate_d2 = (plr_real)c->gate_d2;
-    par->gate_residual2 = squared(c->gate_residual_px);
-    par->min_disparity = (plr_real)c->min_disparity_px;
-    par->max_depth = (plr_real)c->max_depth_m;
-    par->max_row_gap = (plr_real)c->max_row_gap_px;
-    par->min_depth = (plr_real)c->min_depth_m;
-    par->landmark_variance = squared(c->landmark_sigma_m);
-    par->track_drift = squared(c->track_drift_px);
-    par->min_inverse_range = (plr_real)(1 / c->max_range_m);
-    plr_calibration_lay_out(par, c);
-    par->gravity = (plr_real)c->gravity_mps2;
-    par->accel_density = squared(c->accel_noise);
-    par->gyro_density = squared(c->gyro_noise);
-    par->accel_walk = squared(c->accel_walk);
-    par->gyro_walk = squared(c->gyro_walk);
-    par->start_velocity_variance = squared(c->start_velocity_sigma_mps);
-    par->max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
+    source->bias_velocity_walk = (plr_real)c->bias_velocity_walk;
+    source->bias_gyro_walk = (plr_real)c->bias_gyro_walk;
+    source->gravity = (plr_real)c->gravity_mps2;
+    source->accel_density = squared(c->accel_noise);
+    source->gyro_density = squared(c->gyro_noise);
+    source->accel_walk_variance = squared(c->accel_walk);
+    source->gyro_walk_variance = squared(c->gyro_walk);
+    source->start_velocity_variance = squared(c->start_velocity_sigma_mps);
+    source->gate_d2 = (plr_real)c->gate_d2;
+    source->process = c->process;
+    source->timing = c->process == PLR_PROCESS_IMU ? c->imu_timing : c->twist_timing;
+    source->noise = c->noise;
+    source->poses_are_given = c->mode == PLR_MODE_MAPPING;
+}
+
+/* All that init derives from settings and calibration. */
+static void set_constants(plr_filter *f, const plr_calibration *calibration, const plr_config *c) {
+    f->par.gate_d2 = (plr_real)c->gate_d2;
+    f->par.gate_residual2 = squared(c->gate_residual_px);
+    f->par.max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
+    set_camera_model(&f->camera, calibration, c);
+    set_source(&f->source, c);
+    f->belief.model = c->model;
+    f->belief.capacity = c->slots;
+    f->belief.layout.errors = f->camera.errors.count;
+    plr_extrinsics_set(f, c);
+    plr_se3_adjoint(f->camera.Ad_CB, f->camera.given.R_CB, f->camera.given.t_CB);
 }
 
 plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibration,
@@ -113,9 +131,8 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
     f->config = *config;
     if (map)
         f->map = *map;
-    f->model = config->model;
-    set_parameters(&f->par, calibration, config);
-    plr_process_of(f)->lay_out(f);
+    set_constants(f, calibration, config);
+    plr_process_of(&f->source)->lay_out(&f->belief, &f->config);
     f->magic = PLR_FILTER_MAGIC;
     plr_guard_seal_constant(f);
     return plr_filter_reset(f);
@@ -129,25 +146,13 @@ static void start_covariance(const plr_filter *f, double P_xi[PLR_POSE_SQUARE]) 
         P_xi[(PLR_POSE_DIM + 1) * i] = sigma * sigma;
 }
 
-void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
-    plr_velocity_forget_bias(f);
-    plr_covariance_begin_diagonal(f, PLR_BLOCK_BIAS, variance);
-}
-
-void plr_filter_begin_velocity(plr_filter *f) {
-    const double v = (double)f->par.start_velocity_variance;
-    const double variance[PLR_VELOCITY_DIM] = {v, v, v};
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
-        plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, variance);
-}
-
 static void set_bias_prior(plr_filter *f, const double mean[PLR_POSE_DIM],
                            const double variance[PLR_POSE_DIM]) {
     for (int i = 0; i < PLR_POSE_DIM; i++) {
-        f->bias[i] = f->bias_prior[i] = (plr_real)mean[i];
-        f->bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
+        f->belief.bias[i] = f->source.bias_prior[i] = (plr_real)mean[i];
+        f->source.bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
     }
-    f->bias_walked_s = 0;
+    f->source.bias_walked_s = 0;
     plr_filter_begin_bias(f, variance);
 }
 
@@ -170,30 +175,31 @@ plr_status plr_filter_reset(plr_filter *f) {
     const plr_status sound = plr_guard_check_constant(f);
     if (sound != PLR_OK)
         return sound;
-    f->t_ns = f->reading_ns = 0;
-    f->interval_s = 0;
-    f->clock_started = f->reading_valid = f->diverged = 0;
-    memset(f->reading, 0, sizeof f->reading);
-    memset(f->bias, 0, sizeof f->bias);
-    memset(f->p_WB, 0, sizeof f->p_WB);
+    f->belief.t_ns = f->source.reading_ns = 0;
+    f->source.interval_s = 0;
+    f->clock_started = f->source.reading_valid = 0;
+    memset(f->source.reading, 0, sizeof f->source.reading);
+    memset(f->belief.bias, 0, sizeof f->belief.bias);
+    memset(f->belief.velocity, 0, sizeof f->belief.velocity);
+    memset(f->belief.p_WB, 0, sizeof f->belief.p_WB);
     memset(&f->totals, 0, sizeof f->totals);
-    plr_mat3_identity(f->R_WB);
-    memset(&f->core_motion, 0, sizeof f->core_motion);
-    plr_calibration_reset(f);
-    plr_motion_clear(f);
-    plr_velocity_forget(f);
-    plr_alignment_clear(f);
-    f->count = 0;
-    f->frame_number = 0;
+    plr_mat3_identity(f->belief.R_WB);
+    memset(&f->motion.core, 0, sizeof f->motion.core);
+    plr_calibration_reset(&f->camera);
+    plr_motion_clear(&f->belief, &f->motion);
+    plr_velocity_forget(&f->belief, &f->source);
+    plr_alignment_clear(&f->belief, &f->source);
+    f->belief.count = 0;
+    f->belief.frame_number = 0;
     f->frames_off_the_map = 0;
     plr_supervise_begin(&f->supervisor, &f->config);
-    memset(f->bias_prior, 0, sizeof f->bias_prior);
-    f->bias_walked_s = 0;
+    memset(f->source.bias_prior, 0, sizeof f->source.bias_prior);
+    f->source.bias_walked_s = 0;
     start_covariance(f, P_xi);
-    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
+    plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_xi);
     plr_filter_store_for_recovery(f);
     plr_filter_begin_velocity(f);
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
+    if (plr_has_block(&f->belief, PLR_BLOCK_BIAS))
         start_bias(f);
     plr_guard_seal_whole(f);
     return PLR_OK;
@@ -202,19 +208,10 @@ plr_status plr_filter_reset(plr_filter *f) {
 /* ---------------------------------------------------------------- set by the caller */
 
 void plr_filter_forget_reading(plr_filter *f) {
-    plr_velocity_forget(f);
-    f->reading_valid = 0;
-    f->interval_s = 0;
-    plr_process_of(f)->rest(f, f->reading);
-}
-
-plr_status plr_filter_refuse(plr_filter *f, plr_status status) {
-    if (status == PLR_E_LATE)
-        f->totals.late++;
-    else
-        f->totals.refused++;
-    plr_guard_seal(f);
-    return status;
+    plr_velocity_forget(&f->belief, &f->source);
+    f->source.reading_valid = 0;
+    f->source.interval_s = 0;
+    plr_process_of(&f->source)->rest(&f->belief, &f->source, f->source.reading);
 }
 
 static plr_status check_pose(const plr_pose *T_WB) {
@@ -232,9 +229,9 @@ static void get_rotation(plr_real R[9], const plr_pose *T_WB) {
 }
 
 static void store_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
-    get_rotation(f->R_WB, T_WB);
-    memcpy(f->p_WB, T_WB->p, sizeof f->p_WB);
-    f->t_ns = t_ns;
+    get_rotation(f->belief.R_WB, T_WB);
+    memcpy(f->belief.p_WB, T_WB->p, sizeof f->belief.p_WB);
+    f->belief.t_ns = t_ns;
     f->clock_started = 1;
 }
 
@@ -263,23 +260,22 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     plr_extrinsics_pose_in(f, &at);
     plr_extrinsics_covariance_in(f, P_start);
     plr_predict_drop(f);
-    plr_alignment_follow_clock(f, t_ns);
+    plr_alignment_follow_clock(&f->belief, &f->source, t_ns);
     if (f->clock_started)
         f->totals.resets++;
-    f->count = 0;
-    plr_covariance_begin(f, PLR_BLOCK_POSE, P_start);
+    f->belief.count = 0;
+    plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_start);
     store_pose(f, t_ns, &at);
-    f->inertial.pose_given = 1;
+    f->source.inertial.pose_given = 1;
     if (P_xi)
-        plr_alignment_keep_world(f);
+        plr_alignment_keep_world(&f->source);
     plr_supervise_pose_set(&f->supervisor);
     plr_filter_store_for_recovery(f);
-    f->diverged = 0;
     f->frames_off_the_map = 0;
-    if (!plr_covariance_is_positive(f)) /* the biases are lost too */
+    if (!plr_covariance_is_positive(&f->belief)) /* the biases are lost too */
         plr_filter_begin_prior_bias(f, 0);
     /* readings and frames of another clock are not used any more */
-    if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
+    if (f->source.reading_ns > t_ns || t_ns - f->source.reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
     if (f->supervisor.last_frame_ns > t_ns ||
         t_ns - f->supervisor.last_frame_ns > f->par.max_gap_ns)
@@ -292,8 +288,8 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
     const plr_status sound = mean && variance ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (!plr_has_block(f, PLR_BLOCK_BIAS) || f->totals.twists > 0 || f->totals.frames > 0 ||
-        f->config.mode == PLR_MODE_MAPPING)
+    if (!plr_has_block(&f->belief, PLR_BLOCK_BIAS) || f->totals.twists > 0 ||
+        f->totals.frames > 0 || f->config.mode == PLR_MODE_MAPPING)
         return plr_filter_refuse(f, PLR_E_MODE);
     if (!plr_all_finite(mean, PLR_POSE_DIM) || !plr_all_finite(variance, PLR_POSE_DIM))
         return plr_filter_refuse(f, PLR_E_NOT_FINITE);
@@ -318,7 +314,7 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     const plr_status status = check_pose(T_WB);
     if (status != PLR_OK)
         return plr_filter_refuse(f, status);
-    if (f->clock_started && t_ns <= f->t_ns)
+    if (f->clock_started && t_ns <= f->belief.t_ns)
         return plr_filter_refuse(f, PLR_E_TIME);
     plr_pose at = *T_WB;
     plr_extrinsics_pose_in(f, &at);
@@ -329,7 +325,7 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     }
     plr_real R[9];
     get_rotation(R, &at);
-    plr_motion_jump(f, t_ns, R, at.p);
+    plr_motion_jump(&f->belief, &f->motion, t_ns, R, at.p);
     plr_guard_seal(f);
     return PLR_OK;
 }
@@ -338,16 +334,16 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
 
 plr_readings_evidence plr_filter_readings_at(const plr_filter *f, plr_time_ns now_ns) {
     const bool imu = f->config.process == PLR_PROCESS_IMU;
-    const plr_imu_fault fault = (plr_imu_fault)f->inertial.fault;
+    const plr_imu_fault fault = (plr_imu_fault)f->source.inertial.fault;
     return (plr_readings_evidence){.now_ns = now_ns,
-                                   .reading_ns = f->reading_ns,
-                                   .interval_s = f->interval_s,
-                                   .valid = f->reading_valid,
+                                   .reading_ns = f->source.reading_ns,
+                                   .interval_s = f->source.interval_s,
+                                   .valid = f->source.reading_valid,
                                    .needed = f->config.mode != PLR_MODE_MAPPING,
                                    .looks = f->config.mode != PLR_MODE_DEAD_RECKONING,
                                    .imu = imu,
-                                   .started = !imu || f->inertial.started,
-                                   .unsettled = imu && plr_alignment_is_unsettled(f),
+                                   .started = !imu || f->source.inertial.started,
+                                   .unsettled = imu && plr_alignment_is_unsettled(&f->source),
                                    .fault_of_start = fault > PLR_IMU_FAULT_MOVES &&
                                                      fault < PLR_IMU_FAULT_SATURATED,
                                    .fault_of_reading = fault >= PLR_IMU_FAULT_SATURATED,
@@ -382,7 +378,8 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
         health->reasons = sound == PLR_E_DAMAGED ? PLR_REASON_STATE_DAMAGED : 0;
         return sound;
     }
-    const plr_readings_evidence now = plr_filter_readings_at(f, t_ns > f->t_ns ? t_ns : f->t_ns);
+    const plr_readings_evidence now =
+        plr_filter_readings_at(f, t_ns > f->belief.t_ns ? t_ns : f->belief.t_ns);
     plr_supervise_health(&f->supervisor, &now, health);
     health->resets = f->totals.resets + f->totals.widened;
     return PLR_OK;

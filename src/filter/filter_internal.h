@@ -46,6 +46,13 @@ void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], boo
  * sigmas. Only without landmarks. */
 void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas);
 
+/* A variance is no longer positive: notes when. Returns PLR_E_DIVERGED, for the caller to pass on until
+ * plr_filter_recover. */
+plr_status plr_filter_diverge(plr_filter *f);
+
+/* plr_covariance_close_noise, where a failure is a divergence. */
+plr_status plr_filter_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
+
 /* After a divergence: keeps the pose, sets its covariance to the stored one, drops the landmarks,
  * and sets the biases' covariance to their prior's. */
 void plr_filter_recover(plr_filter *f);

@@ -23,9 +23,9 @@ bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2) {
 plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
     plr_verdict verdict = {.accepted = false};
     plr_real full[9], S[6], e[3];
-    plr_covariance_of_rows(f, &m->H, full);
+    plr_covariance_of_rows(&f->belief, &m->H, full);
     if (f->work.noise.open)
-        plr_covariance_add_open_noise(f, &m->H, full);
+        plr_covariance_add_open_noise(&f->belief, &f->work.noise, &m->H, full);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         if (m->max_variance > 0 && !(full[4 * i] <= m->max_variance))
             return verdict;
@@ -36,7 +36,7 @@ plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
     memcpy(e, m->r, sizeof e);
     plr_solve3_transposed(1, S, e);
     verdict.d2 = plr_dot3(e, e) + m->extra_d2;
-    verdict.gain = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
+    verdict.det_S = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
     verdict.accepted = plr_gate_accepts(f, verdict.d2, m->residual2);
     return verdict;
 }

@@ -49,10 +49,10 @@ static void add(plr_checksum *sum, const void *memory, size_t bytes) {
     }
 }
 
-/* The members from one offset to another. */
-static void add_between(plr_checksum *sum, const plr_filter *f, size_t from, size_t to) {
-    add(sum, (const unsigned char *)f + from, to - from);
-}
+/* Members of the filter: from the beginning of one to that of another behind it. */
+#define ADD_BETWEEN(sum, f, from, to)                                                              \
+    add((sum), (const unsigned char *)(f) + offsetof(plr_filter, from),                            \
+        offsetof(plr_filter, to) - offsetof(plr_filter, from))
 
 /* A one-to-one function of `mixed` and of `word`. */
 static uint32_t step(uint32_t mixed, uint32_t word) {
@@ -71,30 +71,36 @@ static uint64_t mixed(const plr_checksum *sum) {
 
 static uint64_t constant_sum(const plr_filter *f) {
     plr_checksum sum = {{0}};
-    add_between(&sum, f, offsetof(plr_filter, config), offsetof(plr_filter, t_ns));
+    ADD_BETWEEN(&sum, f, config, camera.estimate);
+    ADD_BETWEEN(&sum, f, source, source.reading_ns);
+    ADD_BETWEEN(&sum, f, belief, belief.count);
     return mixed(&sum);
 }
 
 static uint64_t small_sum(const plr_filter *f) {
-    const size_t used = plr_covariance_size(f, f->count);
+    const size_t used = plr_covariance_size(&f->belief, f->belief.count);
     plr_checksum sum = {{0}};
-    add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
-    add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
-    add_between(&sum, f, offsetof(plr_filter, core_motion), offsetof(plr_filter, guard));
-    if (f->config.process == PLR_PROCESS_IMU && !f->inertial.started)
-        add(&sum, &f->either.alignment, sizeof f->either.alignment);
-    if (f->velocities_known)
-        add(&sum, &f->either.velocities, sizeof f->either.velocities);
+    ADD_BETWEEN(&sum, f, camera.estimate, source);
+    ADD_BETWEEN(&sum, f, source.reading_ns, source.either);
+    ADD_BETWEEN(&sum, f, motion, belief);
+    ADD_BETWEEN(&sum, f, belief.count, belief.slots);
+    add(&sum, plr_covariance_elements(&f->belief), (used < HEAD ? used : HEAD) * sizeof(plr_real));
+    ADD_BETWEEN(&sum, f, clock_started, guard);
+    if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
+        add(&sum, &f->source.either.alignment, sizeof f->source.either.alignment);
+    if (f->source.velocities_known)
+        add(&sum, &f->source.either.velocities, sizeof f->source.either.velocities);
     return mixed(&sum);
 }
 
 static uint64_t large_sum(const plr_filter *f) {
     plr_checksum sum = {{0}};
-    add(&sum, f->slots, f->count * sizeof *f->slots);
-    add_between(&sum, f, offsetof(plr_filter, supervisor), offsetof(plr_filter, either));
-    add(&sum, plr_covariance_elements(f), plr_covariance_size(f, f->count) * sizeof(plr_real));
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        add(&sum, f->S[k], plr_covariance_dim(f) * sizeof *f->S[k]);
+    add(&sum, f->belief.slots, f->belief.count * sizeof *f->belief.slots);
+    ADD_BETWEEN(&sum, f, supervisor, clock_started);
+    add(&sum, plr_covariance_elements(&f->belief),
+        plr_covariance_size(&f->belief, f->belief.count) * sizeof(plr_real));
+    for (unsigned k = 0; k < f->camera.errors.count; k++)
+        add(&sum, f->belief.S[k], plr_covariance_dim(&f->belief) * sizeof *f->belief.S[k]);
     return mixed(&sum);
 }
 
@@ -103,15 +109,14 @@ static uint64_t large_sum(const plr_filter *f) {
 /* Counts and choices are in their ranges: no index can leave its array. */
 static bool is_in_range(const plr_filter *f) {
     const plr_config *c = &f->config;
-    return c->model <= PLR_MODEL_WORLD && f->model == c->model &&
+    return c->model <= PLR_MODEL_WORLD && f->belief.model == c->model &&
            c->mode <= PLR_MODE_DEAD_RECKONING && c->twist_timing <= PLR_TWIST_MID &&
            c->noise <= PLR_NOISE_STEP && c->process <= PLR_PROCESS_IMU &&
            c->imu_start <= PLR_IMU_START_GIVEN && c->imu_timing <= PLR_TWIST_MID && c->bias <= 1 &&
            c->known_map <= 1 && c->scene <= PLR_SCENE_MAY_MOVE &&
            c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
-           c->slots <= PLR_MAX_LANDMARKS && f->count <= c->slots && f->clock_started <= 1 &&
-           f->reading_valid <= 1 && f->diverged <= 1 && f->motion.pending <= 1 &&
-           f->motion.noisy <= 1;
+           c->slots <= PLR_MAX_LANDMARKS && f->belief.count <= c->slots && f->clock_started <= 1 &&
+           f->source.reading_valid <= 1 && f->motion.pending <= 1 && f->motion.noisy <= 1;
 }
 
 bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]) {
@@ -134,7 +139,8 @@ bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]) {
 
 bool plr_guard_is_landmark(const plr_filter *f, const plr_slot *slot) {
     const plr_real range2 = plr_dot3(slot->x, slot->x);
-    const plr_real least = f->model == PLR_MODEL_BODY ? PLR_R(0.5) * PLR_MIN_RANGE : PLR_R(0);
+    const plr_real least =
+        f->belief.model == PLR_MODEL_BODY ? PLR_R(0.5) * PLR_MIN_RANGE : PLR_R(0);
     return range2 >= least * least && plr_is_finite(range2);
 }
 
@@ -152,8 +158,8 @@ plr_status plr_guard_check(const plr_filter *f) {
     const plr_status status = plr_guard_check_constant(f);
     if (status != PLR_OK)
         return status;
-    const bool sound =
-        is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) && small_sum(f) == f->guard.small;
+    const bool sound = is_in_range(f) && plr_guard_is_pose(f->belief.R_WB, f->belief.p_WB) &&
+                       small_sum(f) == f->guard.small;
     return sound ? PLR_OK : PLR_E_DAMAGED;
 }
 
@@ -173,4 +179,13 @@ void plr_guard_seal_whole(plr_filter *f) {
 
 void plr_guard_seal_constant(plr_filter *f) {
     f->guard.constant = constant_sum(f);
+}
+
+plr_status plr_filter_refuse(plr_filter *f, plr_status status) {
+    if (status == PLR_E_LATE)
+        f->totals.late++;
+    else
+        f->totals.refused++;
+    plr_guard_seal(f);
+    return status;
 }

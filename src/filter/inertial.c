@@ -31,7 +31,7 @@ enum {
 
 static plr_status refuse(plr_filter *f, plr_status status, plr_imu_fault fault) {
     if (fault != PLR_IMU_FAULT_NONE)
-        f->inertial.fault = (uint8_t)fault;
+        f->source.inertial.fault = (uint8_t)fault;
     f->totals.twists_refused++;
     return plr_filter_refuse(f, status);
 }
@@ -42,11 +42,11 @@ static bool is_at(double value, double range) {
 
 static bool is_spike(const plr_filter *f, const plr_real change2[2]) {
     const plr_real least[2] = {SPIKE_ACCEL, SPIKE_GYRO};
-    if (!f->reading_valid || f->inertial.out_of_line >= MOST_SPIKES)
+    if (!f->source.reading_valid || f->source.inertial.out_of_line >= MOST_SPIKES)
         return false;
     for (unsigned i = 0; i < 2; i++)
         if (change2[i] > least[i] * least[i] &&
-            change2[i] > SPIKE_CHANGES * SPIKE_CHANGES * f->inertial.change2[i])
+            change2[i] > SPIKE_CHANGES * SPIKE_CHANGES * f->source.inertial.change2[i])
             return true;
     return false;
 }
@@ -54,12 +54,13 @@ static bool is_spike(const plr_filter *f, const plr_real change2[2]) {
 /* What is wrong with a reading by itself and beside the last one; counts repetitions. */
 static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
                                 const plr_real reading[PLR_POSE_DIM], const plr_real change2[2]) {
-    plr_inertial *s = &f->inertial;
+    plr_inertial *s = &f->source.inertial;
     for (unsigned i = 0; i < 3; i++)
         if (is_at(imu->a_B_mps2[i], f->config.accel_range_mps2) ||
             is_at(imu->w_B_radps[i], f->config.gyro_range_radps))
             return PLR_IMU_FAULT_SATURATED;
-    const bool same = f->reading_valid && memcmp(reading, f->reading, sizeof f->reading) == 0;
+    const bool same = f->source.reading_valid &&
+                      memcmp(reading, f->source.reading, sizeof f->source.reading) == 0;
     s->repeated = same ? (uint16_t)(s->repeated + (s->repeated < UINT16_MAX)) : 0;
     if (s->repeated >= MOST_REPEATED)
         return PLR_IMU_FAULT_FROZEN;
@@ -93,16 +94,16 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     if (planned.status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
         return plr_predict_accept(f, t_ns, reading, &planned);
     plr_real change2[2];
-    plr_statistics_change(f, reading, change2);
+    plr_statistics_change(&f->source, reading, change2);
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    plr_statistics_learn(f, t_ns, reading, planned.step.interval, change2);
-    plr_calibration_note_rate(f, reading + 3);
-    if (f->inertial.started)
+    plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
+    plr_calibration_note_rate(&f->camera, &f->source, reading + 3);
+    if (f->source.inertial.started)
         return plr_predict_accept(f, t_ns, reading, &planned);
-    plr_alignment_add(f, t_ns, reading);
-    if (f->inertial.started)
+    plr_alignment_add(&f->belief, &f->source, &f->config, t_ns, reading);
+    if (f->source.inertial.started)
         plr_filter_store_for_recovery(f);
     const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
     plr_guard_seal_whole(f); /* the start sets P */
@@ -117,9 +118,10 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
 
 /* What is expected, px^2: pixels have noise, and tracks have wandered since the stretch began. */
 static plr_real still2(const plr_filter *f) {
-    const plr_alignment *at = &f->either.alignment;
-    const plr_real seconds = at->count > 0 ? plr_seconds(f->t_ns - at->begin_ns) : PLR_R(0);
-    return PLR_R(4) * f->par.pixel_variance + PLR_R(2) * f->par.track_drift * seconds;
+    const plr_alignment *at = &f->source.either.alignment;
+    const plr_real seconds = at->count > 0 ? plr_seconds(f->belief.t_ns - at->begin_ns) : PLR_R(0);
+    return PLR_R(4) * f->camera.pixel_variance +
+           PLR_R(2) * f->camera.track_drift_variance * seconds;
 }
 
 /* The watched point of this id, or a free place for it; NULL if there is none. */
@@ -159,12 +161,12 @@ static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_o
     return again;
 }
 
-void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
+void plr_filter_watch_start(plr_filter *f, const plr_sightings *sightings) {
     unsigned seen = 0, moved = 0;
-    const bool early = plr_alignment_is_early(&f->either.alignment, f->t_ns);
-    for (unsigned k = 0; k < n; k++) {
-        const plr_observation *o = &frame->observations[f->work.order[k]];
-        plr_watched_point *point = watched(&f->either.alignment, o->id);
+    const bool early = plr_alignment_is_early(&f->source.either.alignment, f->belief.t_ns);
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_observation *o = sightings->at[k].seen;
+        plr_watched_point *point = watched(&f->source.either.alignment, o->id);
         if (!point)
             continue;
         if (point->used) {
@@ -177,18 +179,19 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     if (seen < PLR_POINTS_LEAST ||
         2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
-    f->either.alignment.seen_to_move = 1;
-    plr_alignment_restart(f);
-    plr_alignment_does_not_stand(f, PLR_IMU_FAULT_MOVES);
+    f->source.either.alignment.seen_to_move = 1;
+    plr_alignment_restart(&f->source);
+    plr_alignment_does_not_stand(&f->source, PLR_IMU_FAULT_MOVES);
 }
 
 void plr_filter_follow_start(plr_filter *f, const plr_report *report) {
     if (f->config.process != PLR_PROCESS_IMU)
         return;
-    f->inertial.frames =
-        (uint16_t)(f->inertial.frames + (report->used > 0 && f->inertial.frames < UINT16_MAX));
-    plr_alignment_anchor(f);
-    plr_alignment_watch_gravity(f);
+    f->source.inertial.frames =
+        (uint16_t)(f->source.inertial.frames +
+                   (report->used > 0 && f->source.inertial.frames < UINT16_MAX));
+    plr_alignment_anchor(&f->belief, &f->motion, &f->source, &f->config);
+    plr_alignment_watch_gravity(&f->belief, &f->source);
 }
 
 plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
@@ -197,8 +200,8 @@ plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
     const plr_status sound = v_B_mps && variance ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
-    if (f->config.process != PLR_PROCESS_IMU || !f->inertial.pose_given || f->count > 0 ||
-        f->motion.pending)
+    if (f->config.process != PLR_PROCESS_IMU || !f->source.inertial.pose_given ||
+        f->belief.count > 0 || f->motion.pending)
         return plr_filter_refuse(f, PLR_E_MODE);
     if (!plr_all_finite(v_B_mps, 3) || !plr_all_finite(variance, 3))
         return plr_filter_refuse(f, PLR_E_NOT_FINITE);
@@ -210,14 +213,14 @@ plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
         v[i] = (plr_real)v_B_mps[i];
         P_v[i] = (plr_real)variance[i];
     }
-    plr_alignment_given(f, v, P_v);
+    plr_alignment_given(&f->belief, &f->source, v, P_v);
     plr_filter_store_for_recovery(f);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }
 
 plr_imu_fault plr_filter_imu_fault(const plr_filter *f) {
-    return f && f->magic == PLR_FILTER_MAGIC && f->inertial.fault < PLR_IMU_FAULTS
-               ? (plr_imu_fault)f->inertial.fault
+    return f && f->magic == PLR_FILTER_MAGIC && f->source.inertial.fault < PLR_IMU_FAULTS
+               ? (plr_imu_fault)f->source.inertial.fault
                : PLR_IMU_FAULT_NONE;
 }

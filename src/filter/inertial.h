@@ -5,9 +5,9 @@
 
 #include "pelorus/filter.h"
 
-/* A frame of before the start, with n valid observations in work.order: if most of its points have
+/* A frame of before the start: if most of its points have
  * moved since the readings began to be averaged, the body does not stand, and they begin anew. */
-void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n);
+void plr_filter_watch_start(plr_filter *f, const plr_sightings *sightings);
 
 /* After a frame: fixes position and yaw anew some time after a start in motion. */
 void plr_filter_follow_start(plr_filter *f, const plr_report *report);

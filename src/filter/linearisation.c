@@ -23,16 +23,16 @@ static plr_real inverse_range(const plr_slot *slot) {
  * zero.
  */
 plr_real plr_linearisation_usual(const plr_filter *f) {
-    const plr_real least = f->par.min_inverse_range;
-    plr_real spread = PLR_FMA(least, least, plr_stereo_inverse_range_variance(f));
+    const plr_real least = f->camera.min_inverse_range;
+    plr_real spread = PLR_FMA(least, least, plr_stereo_inverse_range_variance(&f->camera));
     plr_real usual = least;
-    for (unsigned pass = 0; pass < PASSES && f->count > 0; pass++) {
+    for (unsigned pass = 0; pass < PASSES && f->belief.count > 0; pass++) {
         plr_real weights = 0, sum = 0;
-        for (unsigned slot = 0; slot < f->count; slot++) {
-            const plr_real variance = plr_covariance_of_range(f, slot);
+        for (unsigned slot = 0; slot < f->belief.count; slot++) {
+            const plr_real variance = plr_covariance_of_range(&f->belief, slot);
             const plr_real weight = PLR_R(1) / ((variance > 0 ? variance : 0) + spread);
             weights += weight;
-            sum = PLR_FMA(weight, inverse_range(&f->slots[slot]), sum);
+            sum = PLR_FMA(weight, inverse_range(&f->belief.slots[slot]), sum);
         }
         const plr_real mean = sum / weights;
         usual = PLR_R(0.5) * (mean + PLR_SQRT(PLR_FMA(mean, mean, PLR_R(4) / weights)));

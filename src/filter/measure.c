@@ -68,15 +68,17 @@ static bool repeats(const plr_filter *f, const plr_reading *reading) {
 static plr_status check_time(const plr_filter *f, const plr_reading *reading) {
     if (f->config.mode == PLR_MODE_MAPPING)
         return PLR_E_MODE;
-    if (!plr_process_has_started(f))
+    if (!plr_process_has_started(&f->source))
         return PLR_E_NOT_READY;
-    if (!f->clock_started || !f->reading_valid || repeats(f, reading))
+    if (!f->clock_started || !f->source.reading_valid || repeats(f, reading))
         return PLR_E_TIME;
-    if (reading->t_ns < f->t_ns)
+    if (reading->t_ns < f->belief.t_ns)
         return PLR_E_LATE;
-    if (reading->t_ns - f->t_ns > f->par.max_gap_ns)
+    if (reading->t_ns - f->belief.t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_process_of(f)->check(f, f->reading, plr_seconds(reading->t_ns - f->t_ns));
+    return plr_process_of(&f->source)
+        ->check(&f->belief, &f->source, f->source.reading,
+                plr_seconds(reading->t_ns - f->belief.t_ns));
 }
 
 /* d^2 = r^T (M P M^T + R)^-1 r of three rows M over six numbers of covariance P; negative if that
@@ -106,7 +108,7 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     plr_real u[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
     bool accepted = true;
     const unsigned parts = kind->of_twist(reading, rows);
-    plr_process_of(f)->now(f, u, P_u);
+    plr_process_of(&f->source)->now(&f->belief, &f->motion, &f->source, u, P_u);
     for (unsigned part = 0; part < parts; part++) {
         plr_real r[PLR_ROWS];
         for (unsigned i = 0; i < PLR_ROWS; i++) {
@@ -119,18 +121,18 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
         accepted = passes(f, d2) && accepted;
     }
     for (unsigned part = 0; accepted && part < parts; part++)
-        plr_velocity_hold(f, kind->place + part, &rows[part]);
+        plr_velocity_hold(&f->belief, &f->source, kind->place + part, &rows[part]);
     return accepted;
 }
 
-/* Corrects the state by measurements that were accepted. */
-static bool correct(plr_filter *f, const plr_measurement *m, unsigned count) {
-    if (!f->diverged)
-        (void)plr_correct(f, 0, m, count);
-    if (!f->diverged)
-        return true;
-    plr_filter_recover(f);
-    return false;
+/* The pending motion has been applied, with this status: corrects the state by measurements that were
+ * accepted. False if the filter had to recover. */
+static bool correct(plr_filter *f, plr_status status, const plr_measurement *m, unsigned count) {
+    if (status == PLR_OK)
+        status = plr_correct(f, NULL, m, count).status;
+    if (status != PLR_OK)
+        plr_filter_recover(f);
+    return status == PLR_OK;
 }
 
 /* Where velocity is estimated, a reading of the twist is one of the state: gates it, and applies
@@ -142,17 +144,18 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     bool accepted = true;
     const unsigned parts = kind->of_twist(reading, rows);
     plr_filter_note_motion(f);
-    plr_predict_apply_pending(f);
+    const plr_status status = plr_predict_apply_pending(f);
     memset(m, 0, sizeof m);
-    for (unsigned part = 0; part < parts && !f->diverged; part++) {
-        plr_process_of(f)->measure(f, &rows[part], &m[part].H, m[part].r, m[part].R);
+    for (unsigned part = 0; part < parts && status == PLR_OK; part++) {
+        plr_process_of(&f->source)
+            ->measure(&f->belief, &f->source, &rows[part], &m[part].H, m[part].r, m[part].R);
         const plr_verdict verdict = plr_gate_judge(f, &m[part]);
         result->d2 += (double)verdict.d2;
         accepted = accepted && verdict.accepted;
     }
     if (reading->sensor == PLR_SENSOR_STANDSTILL)
-        f->inertial.still_ns = f->t_ns;
-    return correct(f, m, accepted ? parts : 0) && accepted;
+        f->source.inertial.still_ns = f->belief.t_ns;
+    return correct(f, status, m, accepted ? parts : 0) && accepted;
 }
 
 /* The place is p + R (rho + theta x rho / 2 + ...), and H has the first order alone. Where the other axes
@@ -169,8 +172,8 @@ static plr_real second_order(const plr_filter *f, const plr_reading *reading,
             continue;
         for (unsigned i = 0; i < 3; i++)
             for (unsigned j = 0; j < 3; j++)
-                row[i] = PLR_FMA(P[PLR_POSE_DIM * i + j], f->R_WB[3 * axis + j], row[i]);
-        way += plr_dot3(row, f->R_WB + 3 * axis);
+                row[i] = PLR_FMA(P[PLR_POSE_DIM * i + j], f->belief.R_WB[3 * axis + j], row[i]);
+        way += plr_dot3(row, f->belief.R_WB + 3 * axis);
     }
     return PLR_R(0.25) * way * turn;
 }
@@ -191,16 +194,17 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     memset(&m, 0, sizeof m);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = 1;
-    kind->of_state(f, reading, &m);
-    PLR_ASSERT(m.H.terms == 1 && m.H.term[0].row == plr_row_of(f, PLR_BLOCK_POSE));
-    plr_motion_pose_covariance(f, P_xi);
+    kind->of_state(&f->belief, reading, &m);
+    PLR_ASSERT(m.H.terms == 1 && m.H.term[0].row == plr_row_of(&f->belief, PLR_BLOCK_POSE));
+    plr_motion_pose_covariance(&f->belief, &f->motion, P_xi);
     plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P_xi);
     if (kind->bounds_position != 0)
         widen(reading, 1, second_order(f, reading, P_xi), m.R);
     plr_sandwich3(S, HP, m.H.term[0].H, P_xi);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = PLR_FMA(SHARPEST * PLR_EPSILON, S[4 * i], m.R[i]);
-    plr_sensitivity_add_to_pose(f, P_xi); /* a camera that is off by a share is no wrong reading */
+    plr_sensitivity_add_to_pose(&f->belief, &f->camera, &f->motion,
+                                P_xi); /* a camera that is off by a share is no wrong reading */
     plr_real d2 = distance2(m.H.term[0].H, P_xi, m.R, m.r);
     result->d2 = d2 > 0 ? (double)d2 : 0;
     const plr_real wider = plr_supervise_widening(&f->supervisor, reading->sensor);
@@ -211,8 +215,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     if (!passes(f, d2) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
     plr_filter_note_motion(f);
-    plr_predict_apply_pending(f);
-    return correct(f, &m, 1);
+    return correct(f, plr_predict_apply_pending(f), &m, 1);
 }
 
 static void count(plr_filter *f, const plr_reading_result *result) {
@@ -223,8 +226,8 @@ static void count(plr_filter *f, const plr_reading_result *result) {
 bool plr_measure_twist(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
     const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
     PLR_ASSERT(kind->of_twist);
-    result->used = plr_process_of(f)->measure ? apply_to_velocity(f, kind, reading, result)
-                                              : hold(f, kind, reading, result);
+    result->used = plr_process_of(&f->source)->measure ? apply_to_velocity(f, kind, reading, result)
+                                                       : hold(f, kind, reading, result);
     count(f, result);
     return result->used;
 }
@@ -236,7 +239,7 @@ static bool measure(plr_filter *f, const plr_reading *reading, plr_reading_resul
     result->used = apply(f, kind, reading, result);
     count(f, result);
     if (result->used)
-        plr_alignment_keep_world(f);
+        plr_alignment_keep_world(&f->source);
     return result->used;
 }
 
@@ -248,7 +251,8 @@ static void supervise(plr_filter *f, const plr_reading *reading, bool used, doub
         numbers += plr_reading_has(reading, i);
     if (reading->sensor == PLR_SENSOR_STANDSTILL) /* three of each of its bits */
         numbers *= 3;
-    plr_supervise_reading(&f->supervisor, reading, numbers, used, (plr_real)d2, bounds, f->t_ns);
+    plr_supervise_reading(&f->supervisor, reading, numbers, used, (plr_real)d2, bounds,
+                          f->belief.t_ns);
 }
 
 static plr_status refuse(plr_filter *f, plr_status status, plr_reading_result *result) {

@@ -48,13 +48,13 @@ enum {
 /* True if a landmark was out of sight before this frame, and may be lost. */
 static bool is_unseen(const plr_search *s, unsigned i) {
     const plr_slot *slot = plr_search_slot(s, i);
-    return !slot->known && s->f->t_ns - slot->last_seen_ns > UNSEEN_NS;
+    return !slot->known && s->f->belief.t_ns - slot->last_seen_ns > UNSEEN_NS;
 }
 
 /* True if its bearing is too uncertain to linearise at, though the motion were known: the pose drifted
  * meanwhile. */
 static bool is_lost(const plr_search *s, unsigned i) {
-    const plr_real limit = plr_stereo_max_bearing_variance(s->f), *P = s->sightings[i].P;
+    const plr_real limit = plr_stereo_max_bearing_variance(&s->f->camera), *P = s->residuals[i].P;
     return is_unseen(s, i) && !(P[0] <= limit && P[4] <= limit);
 }
 
@@ -66,8 +66,8 @@ static bool is_dark(const plr_search *s) {
  * in nu when it ends; by an IMU, which lost velocity and tilt as well, it stays in the landmarks' own
  * covariance after that. By twists, where frames did measure the motion, one rejection is an outlier. */
 static bool has_drifted(const plr_search *s, unsigned i) {
-    const bool may_be = is_dark(s) || plr_has_block(s->f, PLR_BLOCK_VELOCITY);
-    return may_be && s->sightings[i].uncertain && is_unseen(s, i);
+    const bool may_be = is_dark(s) || plr_has_block(&s->f->belief, PLR_BLOCK_VELOCITY);
+    return may_be && s->residuals[i].uncertain && is_unseen(s, i);
 }
 
 /* What makes a prediction too uncertain to linearise at. */
@@ -77,10 +77,10 @@ typedef enum plr_uncertainty {
 } plr_uncertainty;
 
 /* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in
- * S, and gain = det S. If the prediction is too uncertain to linearise at, prior_d2 is negative and
+ * S, and det_S. If the prediction is too uncertain to linearise at, prior_d2 is negative and
  * the observation takes no part in the search. */
 static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
-    plr_sighting *at = &s->sightings[i];
+    plr_residual *at = &s->residuals[i];
     at->prior_d2 = -1;
     const bool dark = is_dark(s) && by == PLR_OF_POINT_AND_MOTION, lost = is_lost(s, i);
     at->uncertain = dark || lost; /* unless the prediction below says otherwise */
@@ -90,9 +90,9 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
     }
     const plr_real *U = at->U[s->current];
     plr_real M[6], x[3];
-    const plr_real limit = plr_stereo_max_variance(s->f);
+    const plr_real limit = plr_stereo_max_variance(&s->f->camera);
     /* px^2, as the limit is */
-    const plr_real most = limit * plr_stereo_max_bearing_variance(s->f);
+    const plr_real most = limit * plr_stereo_max_bearing_variance(&s->f->camera);
     bool basis = true, within = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
@@ -111,7 +111,7 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
             for (unsigned l = 0; l < 3; l++)
                 sum += u[k] * u[l] *
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
-        const plr_real noise = plr_stereo_variance(s->f, r);
+        const plr_real noise = plr_stereo_variance(&s->f->camera, r);
         basis = basis && (by == PLR_OF_POINT ? own : sum) - noise <= limit;
         within = within && (dark ? sum : own) - noise <= most;
     }
@@ -124,13 +124,13 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
     plr_solve3_transposed(1, M, x);
     at->prior_d2 = plr_dot3(x, x);
     const plr_real root = U[0] * U[3] * U[5] * M[0] * M[3] * M[5];
-    at->gain = root * root;
+    at->det_S = root * root;
 }
 
 /* d^2 of an observation about the motion that all others give. With h = a (I + J)^-1 a^T and the
  * weight w of the observation in J it is e^T [(I - w h)(I + (1 - w) h)]^-1 e. `share` receives the
  * smallest pivot of the matrix in brackets, about the share that the others contribute. */
-static plr_real leave_one_out(const plr_sighting *at, const plr_real *U,
+static plr_real leave_one_out(const plr_residual *at, const plr_real *U,
                               const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real *share) {
     plr_real X[PLR_ROWS * PLR_POSE_DIM], h[9], M[6];
     const plr_real w = at->weight;
@@ -168,39 +168,35 @@ static plr_real leave_one_out(const plr_sighting *at, const plr_real *U,
 /* The squared norm of the four pixel residuals at the point evaluated last, for the setting
  * gate-residual. */
 static plr_real residual_norm2(const plr_search *s, unsigned i) {
-    const plr_sighting *at = &s->sightings[i];
+    const plr_residual *at = &s->residuals[i];
     plr_real r[3];
     plr_multiply3_transposed(r, at->U[s->current], at->e);
-    return plr_stereo_residual2(plr_search_observation(s, i), r);
+    return plr_stereo_residual2(plr_search_row(s, i)->seen, r);
 }
 
-/* What the gate says of an observation. Adds d^2 of an accepted one to *nis, and its innovation to its
- * track. */
+/* What the gate says of an observation, with its d^2. Adds the innovation of an accepted one to its track. */
 static plr_gate_result judge(plr_search *s, unsigned i, bool found, const plr_real *U,
-                             const plr_real dz[PLR_POSE_DIM], float *nis) {
-    const plr_sighting *at = &s->sightings[i];
-    plr_real d2 = at->prior_d2, e[3], share = 0;
+                             const plr_real dz[PLR_POSE_DIM], plr_real *judged_d2) {
+    const plr_residual *at = &s->residuals[i];
+    plr_real d2 = *judged_d2 = at->prior_d2, e[3], share = 0;
     if (!(d2 >= 0) || at->behind)
         return PLR_GATE_REJECTED;
     if (found) {
         const plr_real without_it = leave_one_out(at, U, dz, e, &share);
         d2 = share >= LEAST_SHARE ? without_it : d2;
     }
-    d2 += plr_stereo_row_gap_d2(s->f, plr_search_observation(s, i));
+    *judged_d2 = d2 += plr_stereo_row_gap_d2(&s->f->camera, plr_search_row(s, i)->seen);
     const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
         plr_track_add(slot, e);
     if (!accepted)
         return plr_gate_rejection(d2);
-    if (slot->moving)
-        return PLR_GATE_REJECTED;
-    *nis += (float)d2;
-    return PLR_GATE_ACCEPTED;
+    return slot->moving ? PLR_GATE_REJECTED : PLR_GATE_ACCEPTED;
 }
 
 /* How much an observation tells about the translation, 1/sigma: of a distant point little. */
-static plr_real telling(const plr_sighting *at) {
+static plr_real telling(const plr_residual *at) {
     plr_real sum = 0;
     for (unsigned r = 0; r < PLR_ROWS && !at->behind; r++)
         sum += plr_dot3(at->a + PLR_POSE_DIM * r, at->a + PLR_POSE_DIM * r);
@@ -208,7 +204,7 @@ static plr_real telling(const plr_sighting *at) {
 }
 
 /* True if an observation agrees with the motion at the point evaluated last. */
-static bool agrees(const plr_sighting *at) {
+static bool agrees(const plr_residual *at) {
     return !at->behind && plr_dot3(at->e, at->e) < AGREES_BELOW;
 }
 
@@ -220,9 +216,9 @@ typedef struct plr_agreement {
 static plr_agreement count_agreement(const plr_search *s) {
     plr_agreement a = {0, 0};
     for (unsigned i = 0; i < s->count; i++) {
-        const bool active = s->sightings[i].active > 0;
+        const bool active = s->residuals[i].active > 0;
         a.active += active;
-        a.agree += active && agrees(&s->sightings[i]);
+        a.agree += active && agrees(&s->residuals[i]);
     }
     return a;
 }
@@ -242,7 +238,7 @@ static plr_misfit find_misfit(const plr_search *s, const plr_search_point *best)
     plr_real active = 0, weight = 0, told = 0, told_by_misfits = 0;
     unsigned misfits = 0; /* only these can come to support another motion */
     for (unsigned i = 0; i < s->count; i++) {
-        const plr_sighting *at = &s->sightings[i];
+        const plr_residual *at = &s->residuals[i];
         active += at->active;
         weight += at->weight;
         if (!(at->active > 0))
@@ -291,7 +287,7 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
     unsigned with = 0, against = 0;
     plr_real told = 0, told_against = 0;
     for (unsigned i = 0; i < s->count; i++) {
-        const plr_sighting *at = &s->sightings[i];
+        const plr_residual *at = &s->residuals[i];
         const plr_real d2 = plr_dot3(at->e, at->e);
         if (!(at->active > 0))
             continue;
@@ -319,8 +315,8 @@ static PLR_SELDOM bool search_without_twists(plr_search *s, plr_search_point *be
     const bool most_agree = is_three_fifths(count_agreement(s));
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].twist_d2 = plr_dot3(s->sightings[i].e, s->sightings[i].e);
-    plr_motion_open_prior(s->f, &s->prior);
+        s->residuals[i].twist_d2 = plr_dot3(s->residuals[i].e, s->residuals[i].e);
+    plr_motion_open_prior(&s->f->belief, &s->f->motion, &s->f->work.noise, &s->prior);
     plr_search_from_zero(s, &open);
     for (unsigned i = 0; i < 2; i++)
         plr_search_descend(s, &open);
@@ -342,7 +338,7 @@ static PLR_SELDOM bool search_without_twists(plr_search *s, plr_search_point *be
 /* All landmarks but those of a given map. */
 static void let_unknown_take_part(plr_search *s) {
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].active = plr_search_slot(s, i)->known ? 0 : 1;
+        s->residuals[i].active = plr_search_slot(s, i)->known ? 0 : 1;
 }
 
 /* Compares all observations with the twists' prediction, and excludes from the search those whose
@@ -353,16 +349,16 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
     unsigned active = 0;
     bool changed = false;
     for (unsigned i = 0; i < s->count; i++) {
-        plr_sighting *at = &s->sightings[i];
+        plr_residual *at = &s->residuals[i];
         const bool was_active = at->active > 0;
         judge_by_prior(s, i, PLR_OF_POINT_AND_MOTION);
         active += at->active > 0;
         changed = changed || (was_active && !(at->active > 0));
     }
     for (unsigned i = 0; active < MIN_POINTS && i < s->count; i++)
-        if (!plr_gate_accepts(s->f, s->sightings[i].prior_d2, 0)) {
-            changed = changed || s->sightings[i].active > 0;
-            s->sightings[i].active = 0;
+        if (!plr_gate_accepts(s->f, s->residuals[i].prior_d2, 0)) {
+            changed = changed || s->residuals[i].active > 0;
+            s->residuals[i].active = 0;
         }
     if (changed)
         plr_search_from_zero(s, best);
@@ -379,7 +375,7 @@ static PLR_SELDOM unsigned search_by_agreement(plr_search *s, plr_search_point *
     let_unknown_take_part(s);
     for (unsigned i = 0; i < s->count; i++) {
         judge_by_prior(s, i, PLR_OF_POINT);
-        active += s->sightings[i].active > 0;
+        active += s->residuals[i].active > 0;
     }
     if (active >= MIN_AGREEING) {
         plr_search_from_zero(s, best);
@@ -404,7 +400,7 @@ static PLR_SELDOM unsigned search_by_agreement(plr_search *s, plr_search_point *
 static bool fits_poorly(const plr_search *s) {
     unsigned active = 0, poor = 0;
     for (unsigned i = 0; i < s->count; i++) {
-        const plr_sighting *at = &s->sightings[i];
+        const plr_residual *at = &s->residuals[i];
         if (!(at->active > 0))
             continue;
         active++;
@@ -414,20 +410,51 @@ static bool fits_poorly(const plr_search *s) {
     return active >= MIN_POOR && 4 * poor >= active;
 }
 
-void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
-                     float *nis) {
-    plr_search s = {.f = f, .frame = frame, .sightings = (plr_sighting *)(void *)f->work.Vt};
+/* Enters the matched rows. Returns how many are not of a given map: the others take no part. */
+static unsigned enter(plr_search *s) {
+    unsigned unknown = 0;
+    for (unsigned k = 0; k < s->sightings->count; k++) {
+        const plr_sighting *row = &s->sightings->at[k];
+        if (!plr_is_matched(row))
+            continue;
+        const bool known = plr_is_of_known(&s->f->belief, row);
+        unknown += !known;
+        plr_search_add(s, k, known ? 0 : 1);
+    }
+    return unknown;
+}
+
+/* Judges every row at the result of the search, and says where its landmark is to be linearised. */
+static void judge_all(plr_search *s, bool found, const plr_real *U, const plr_real dz[PLR_POSE_DIM],
+                      plr_sightings *sightings) {
+    plr_filter *f = s->f;
+    const plr_real usual = plr_linearisation_usual(f);
+    for (unsigned i = 0; i < s->count; i++) {
+        const plr_residual *at = &s->residuals[i];
+        plr_sighting *row = &sightings->at[at->row];
+        plr_linearised *own = &sightings->of_slot[row->slot];
+        plr_slot *slot = plr_slot_of(&f->belief, row);
+        const plr_gate_result result = judge(s, i, found, U, dz, &own->d2);
+        const bool accepted = result == PLR_GATE_ACCEPTED;
+        const bool lost = !accepted && has_drifted(s, i);
+        row->verdict = (uint8_t)(lost ? PLR_GATE_LOST : result);
+        own->det_S = at->det_S;
+        if (lost) /* as if unseen: the frame does not correct it as it does others */
+            slot->last_frame = f->belief.frame_number - 1;
+        if (accepted && !slot->known)
+            f->work.noise.range_shift[row->slot] =
+                plr_linearisation_offset(slot, usual, at->range_change, at->range_variance);
+    }
+}
+
+void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *first) {
+    plr_search s = {
+        .f = f, .sightings = sightings, .residuals = (plr_residual *)(void *)f->work.Vt};
     plr_search_point best;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
-    plr_motion_prior(f, plr_supervise_weight(&f->supervisor), &s.prior);
-    unsigned unknown = 0; /* the others are of a given map, and take no part */
-    for (unsigned k = 0; k < n; k++)
-        if (f->work.slot_of[k] != PLR_NO_SLOT) {
-            const bool known = f->slots[f->work.slot_of[k]].known;
-            f->work.used[s.count] = (uint16_t)k;
-            unknown += !known;
-            plr_search_add(&s, known ? 0 : 1);
-        }
+    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, plr_supervise_weight(&f->supervisor),
+                     &s.prior);
+    const unsigned unknown = enter(&s);
     plr_search_from_zero(&s, &best);
     unsigned active = judge_all_by_prior(&s, &best);
     if (unknown >= MIN_AGREEING && 2 * active < unknown)
@@ -444,19 +471,6 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     found = found && plr_search_factorise(&best, 0, U);
     if (found)
         (void)plr_search_step(&best, U, dz);
-    plr_motion_at(f, &s.prior, best.z, &first->motion);
-    const plr_real usual = plr_linearisation_usual(f);
-    for (unsigned i = 0; i < s.count; i++) {
-        const plr_gate_result result = judge(&s, i, found, U, dz, nis);
-        plr_slot *slot = plr_search_slot(&s, i);
-        const unsigned number = (unsigned)(slot - f->slots);
-        const bool accepted = result == PLR_GATE_ACCEPTED;
-        const bool lost = !accepted && has_drifted(&s, i);
-        plr_gate_note(f, number, lost ? PLR_GATE_LOST : result, s.sightings[i].gain);
-        if (lost) /* as if unseen: the frame does not correct it as it does others */
-            slot->last_frame = f->frame_number - 1;
-        if (accepted && !slot->known)
-            f->work.noise.range_shift[number] = plr_linearisation_offset(
-                slot, usual, s.sightings[i].range_change, s.sightings[i].range_variance);
-    }
+    plr_motion_at(&f->motion, &s.prior, best.z, &first->motion);
+    judge_all(&s, found, U, dz, sightings);
 }

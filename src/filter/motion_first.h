@@ -18,9 +18,8 @@ typedef struct plr_motion_first {
                                   `motion` is that one, with a prior wide enough for it */
 } plr_motion_first;
 
-/* Finds nu and gates every matched observation (work.verdict and work.gain). Adds d^2 of the accepted ones to
- * *nis. Call it before the motion is applied to landmarks and P. */
-void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
-                     float *nis);
+/* Finds nu and gates every matched observation: verdict, d2 and det_S of its row. Call it before the motion
+ * is applied to landmarks and P. */
+void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *first);
 
 #endif

@@ -23,52 +23,50 @@
 /* ---------------------------------------------------------------- applying what is accumulated */
 
 static void finish_motion(plr_filter *f) {
-    plr_process_of(f)->walk(f, f->motion.seconds);
-    f->bias_walked_s += (double)f->motion.seconds;
-    plr_motion_clear(f);
+    plr_process_walk(&f->belief, &f->source, f->motion.seconds);
+    f->source.bias_walked_s += (double)f->motion.seconds;
+    plr_motion_clear(&f->belief, &f->motion);
 }
 
 void plr_predict_drop(plr_filter *f) {
     if (f->motion.pending)
-        plr_covariance_carry_core(f);
+        plr_covariance_carry_core(&f->belief, &f->motion);
     finish_motion(f);
 }
 
-void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
+plr_status plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
     if (plr_norm2_of_6(applied->z) > 0) {
         plr_real n[PLR_POSE_DIM];
         plr_mat6_vec(n, applied->L, applied->z);
         if (!plr_pose_is_correction(n)) {
             plr_filter_propagate_recovery(f);
             plr_predict_drop(f);
-            plr_filter_diverge(f);
-            return;
+            return plr_filter_diverge(f);
         }
-        plr_pose_correct(f, n);
+        plr_pose_correct(&f->belief, n);
     }
-    plr_model_of(f)->propagate(f, applied);
+    plr_model_of(&f->belief)->propagate(&f->belief, &f->camera, &f->motion, &f->work, applied);
     plr_filter_propagate_recovery(f);
     finish_motion(f);
-    if (!plr_covariance_is_positive(f))
-        plr_filter_diverge(f);
+    return plr_covariance_is_positive(&f->belief) ? PLR_OK : plr_filter_diverge(f);
 }
 
-void plr_predict_apply_pending(plr_filter *f) {
+plr_status plr_predict_apply_pending(plr_filter *f) {
     plr_applied_motion applied;
     if (!f->motion.pending)
-        return;
-    plr_motion_prior(f, 1, &applied);
-    plr_predict_apply(f, &applied);
+        return PLR_OK;
+    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, 1, &applied);
+    return plr_predict_apply(f, &applied);
 }
 
-void plr_predict_apply_prior(plr_filter *f) {
-    if (!f->motion.pending || f->diverged)
-        return;
-    plr_predict_apply_pending(f);
-    if (!f->work.noise.open)
-        return;
-    plr_covariance_close_noise(f, NULL);
-    (void)plr_model_of(f)->retract(f, f->work.dx); /* restores plr_slot.beyond */
+plr_status plr_predict_apply_prior(plr_filter *f) {
+    plr_status status = plr_predict_apply_pending(f);
+    if (status != PLR_OK || !f->work.noise.open)
+        return status;
+    status = plr_filter_close_noise(f, NULL);
+    (void)plr_model_of(&f->belief)
+        ->retract(&f->belief, &f->camera, &f->work, f->work.dx); /* restores plr_slot.beyond */
+    return status;
 }
 
 /* The argument `interval` of a process's step. That of twists adds the variance
@@ -77,39 +75,39 @@ void plr_predict_apply_prior(plr_filter *f) {
  * seconds: within the interval tau between readings by the usual sigma^2 tau h, and later, if
  * twists fail to come, to sigma^2 h^2. */
 static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
-    const plr_real tau = f->interval_s;
-    if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
+    const plr_real tau = f->source.interval_s;
+    if (!f->source.reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
         return tau > 0 ? tau : h1 - h0;
     return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
 }
 
 static void take_step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *step) {
-    plr_process_of(f)->step(f, t_ns, step);
-    plr_calibration_note_step(f, step->mean, step->seconds);
+    plr_process_of(&f->source)->step(&f->belief, &f->motion, &f->source, t_ns, step);
+    plr_calibration_note_step(&f->camera, step->mean, step->seconds);
 }
 
 /* Adds what the last reading misses between h0 and h1 seconds after its time. */
 static void add_missed(plr_filter *f, plr_real h0, plr_real h1, const plr_real *next) {
     plr_real variance[PLR_POSE_DIM];
-    if (!f->reading_valid || !plr_process_of(f)->missed ||
-        !plr_process_of(f)->missed(f, h0, h1, next, variance))
+    if (!f->source.reading_valid || !plr_process_of(&f->source)->missed ||
+        !plr_process_of(&f->source)->missed(&f->source, h0, h1, next, variance))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         f->motion.Q[(PLR_POSE_DIM + 1) * i] += variance[i];
 }
 
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
-    if (f->clock_started && t_ns > f->t_ns && plr_process_has_started(f)) {
-        const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
-        const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
-        plr_process_step step = {.seconds = plr_seconds(t_ns - f->t_ns),
+    if (f->clock_started && t_ns > f->belief.t_ns && plr_process_has_started(&f->source)) {
+        const plr_time_ns since = f->source.reading_valid ? f->source.reading_ns : f->belief.t_ns;
+        const plr_real h0 = plr_seconds(f->belief.t_ns - since), h1 = plr_seconds(t_ns - since);
+        plr_process_step step = {.seconds = plr_seconds(t_ns - f->belief.t_ns),
                                  .interval = noise_interval(f, h0, h1)};
-        plr_process_of(f)->hold(f, h0, step.mean);
+        plr_process_of(&f->source)->hold(&f->belief, &f->source, h0, step.mean);
         memcpy(step.whole, step.mean, sizeof step.whole);
         take_step(f, t_ns, &step);
         add_missed(f, h0, h1, NULL);
     }
-    f->t_ns = t_ns;
+    f->belief.t_ns = t_ns;
     f->clock_started = 1;
 }
 
@@ -118,9 +116,9 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
 static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
     if (!f->clock_started)
         return PLR_OK;
-    if ((f->reading_valid && t_ns <= f->reading_ns) || t_ns < f->t_ns)
+    if ((f->source.reading_valid && t_ns <= f->source.reading_ns) || t_ns < f->belief.t_ns)
         return PLR_E_TIME;
-    return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
+    return t_ns - f->belief.t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
 }
 
 /* Checks that the reading can be held for a usual interval. With timing start it is used only when
@@ -129,19 +127,19 @@ static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_
                                 plr_real interval) {
     const plr_real first = PLR_R(1e-3); /* there is no interval yet */
     plr_real seconds = interval > 0 ? interval : first;
-    if (f->interval_s > 0 &&
-        f->interval_s < seconds) /* a longer pause is not expected to be repeated */
-        seconds = f->interval_s;
-    return plr_process_of(f)->check(f, reading, seconds);
+    if (f->source.interval_s > 0 &&
+        f->source.interval_s < seconds) /* a longer pause is not expected to be repeated */
+        seconds = f->source.interval_s;
+    return plr_process_of(&f->source)->check(&f->belief, &f->source, reading, seconds);
 }
 
 static void store_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
                           plr_real interval) {
     PLR_ASSERT(interval >= 0);
-    memcpy(f->reading, reading, sizeof f->reading);
-    f->reading_ns = t_ns;
-    f->reading_valid = 1;
-    f->interval_s = interval;
+    memcpy(f->source.reading, reading, sizeof f->source.reading);
+    f->source.reading_ns = t_ns;
+    f->source.reading_valid = 1;
+    f->source.interval_s = interval;
     f->totals.twists++;
 }
 
@@ -159,10 +157,12 @@ plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
     if (planned.status != PLR_OK)
         return planned;
     plr_process_step *step = &planned.step;
-    plr_process_of(f)->mean(f, t_ns, reading, step);
-    step->seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
-    step->interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : step->seconds;
-    if (plr_process_of(f)->check(f, step->mean, step->seconds) != PLR_OK ||
+    plr_process_of(&f->source)->mean(&f->belief, &f->source, t_ns, reading, step);
+    step->seconds = f->clock_started ? plr_seconds(t_ns - f->belief.t_ns) : 0;
+    step->interval =
+        f->source.reading_valid ? plr_seconds(t_ns - f->source.reading_ns) : step->seconds;
+    if (plr_process_of(&f->source)->check(&f->belief, &f->source, step->mean, step->seconds) !=
+            PLR_OK ||
         check_reading(f, reading, step->interval) != PLR_OK)
         planned.status = PLR_E_RANGE;
     return planned;
@@ -178,11 +178,11 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
         return PLR_OK;
     }
     const plr_process_step *step = &planned->step;
-    if (step->seconds > 0 && plr_process_has_started(f)) {
+    if (step->seconds > 0 && plr_process_has_started(&f->source)) {
         take_step(f, t_ns, step);
         add_missed(f, step->interval - step->seconds, step->interval, reading);
     }
-    f->t_ns = t_ns;
+    f->belief.t_ns = t_ns;
     f->clock_started = 1;
     store_reading(f, t_ns, reading, step->interval);
     plr_guard_seal(f);
@@ -208,8 +208,8 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
     if (planned.status == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
         plr_real change2[2];
-        plr_statistics_change(f, reading, change2);
-        plr_statistics_learn(f, t_ns, reading, planned.step.interval, change2);
+        plr_statistics_change(&f->source, reading, change2);
+        plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
     }
     return plr_predict_accept(f, t_ns, reading, &planned);
 }

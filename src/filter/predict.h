@@ -26,17 +26,17 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
                               const plr_planned_step *planned);
 
 /* Applies D' to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
- * noise is kept in work.noise, not in P, until plr_covariance_close_noise. Sets f->diverged if a
- * variance is no longer positive. */
-void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied);
+ * noise is kept in work.noise, not in P, until plr_covariance_close_noise. PLR_E_DIVERGED if a variance is
+ * no longer positive; likewise the two below. */
+plr_status plr_predict_apply(plr_filter *f, const plr_applied_motion *applied);
 
 /* Applies the accumulated motion to landmarks and covariance without observations: at nu = 0. */
-void plr_predict_apply_prior(plr_filter *f);
+plr_status plr_predict_apply_prior(plr_filter *f);
 
 /* Discards the accumulated motion; the biases' walk of its duration is still added. */
 void plr_predict_drop(plr_filter *f);
 
 /* Applies the accumulated motion, if there is any, at nu = 0. In `body` its noise stays open. */
-void plr_predict_apply_pending(plr_filter *f);
+plr_status plr_predict_apply_pending(plr_filter *f);
 
 #endif

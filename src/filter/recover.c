@@ -8,6 +8,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "process/process.h"
+#include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/calibration.h"
 #include "state/covariance.h"
@@ -27,23 +28,35 @@ static void unpack(const plr_filter *f, plr_real P[PLR_POSE_SQUARE]) {
             P[PLR_POSE_DIM * i + j] = P[PLR_POSE_DIM * j + i] = f->recovery_P[at];
 }
 
+void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
+    plr_velocity_forget_bias(&f->source);
+    plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_BIAS, variance);
+}
+
+void plr_filter_begin_velocity(plr_filter *f) {
+    const double v = (double)f->source.start_velocity_variance;
+    const double variance[PLR_VELOCITY_DIM] = {v, v, v};
+    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY))
+        plr_covariance_begin_diagonal(&f->belief, PLR_BLOCK_VELOCITY, variance);
+}
+
 void plr_filter_store_for_recovery(plr_filter *f) {
     plr_real P[PLR_POSE_SQUARE];
-    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
+    plr_covariance_get(&f->belief, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     pack(f, P);
 }
 
 /* S, drivers x drivers: the covariance of biases and velocity when the filter began, and of theta
  * in P. */
 static void prior_of_drivers(const plr_filter *f, const plr_real P[PLR_POSE_SQUARE], plr_real *S) {
-    const unsigned first = f->layout.driver, drivers = f->layout.drivers;
+    const unsigned first = f->belief.layout.driver, drivers = f->belief.layout.drivers;
     for (unsigned d = 0; d < drivers; d++) {
-        const unsigned row = first + d, bias = plr_row_of(f, PLR_BLOCK_BIAS);
+        const unsigned row = first + d, bias = plr_row_of(&f->belief, PLR_BLOCK_BIAS);
         plr_real *own = &S[(drivers + 1) * d];
         if (row >= bias)
-            *own = plr_bias_prior_variance(f, row - bias);
+            *own = plr_bias_prior_variance(&f->source, row - bias);
         else if (row >= PLR_POSE_DIM)
-            *own = f->par.start_velocity_variance;
+            *own = f->source.start_velocity_variance;
         else
             for (unsigned e = 0; first + e < PLR_POSE_DIM; e++)
                 S[drivers * d + e] = P[PLR_POSE_DIM * row + first + e];
@@ -61,7 +74,7 @@ void plr_filter_propagate_recovery(plr_filter *f) {
     unpack(f, P);
     plr_sandwich6(carried, A, P);
     prior_of_drivers(f, P, S);
-    plr_sandwich_drivers(BSB, f->layout.drivers, m->B, S);
+    plr_sandwich_drivers(BSB, f->belief.layout.drivers, m->B, S);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         carried[i] += m->Q[i] + BSB[i];
     pack(f, carried);
@@ -72,27 +85,39 @@ void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], boo
     pack(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] = (double)P[i];
-    f->count = 0;
+    f->belief.count = 0;
     f->totals.widened++;
     f->frames_off_the_map = 0;
     f->work.noise.open = 0;
-    plr_motion_clear(f);
-    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
+    plr_motion_clear(&f->belief, &f->motion);
+    plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_xi);
     plr_supervise_begun_anew(&f->supervisor, relocated);
     plr_filter_begin_velocity(f);
 }
 
 void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas) {
     double variance[PLR_POSE_DIM];
-    if (!plr_has_block(f, PLR_BLOCK_BIAS))
+    if (!plr_has_block(&f->belief, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        const plr_real prior = plr_bias_prior_variance(f, i), off = f->bias[i] - f->bias_prior[i];
+        const plr_real prior = plr_bias_prior_variance(&f->source, i),
+                       off = f->belief.bias[i] - f->source.bias_prior[i];
         if (!(off * off <= sigmas * sigmas * prior))
-            f->bias[i] = f->bias_prior[i];
+            f->belief.bias[i] = f->source.bias_prior[i];
         variance[i] = (double)prior;
     }
     plr_filter_begin_bias(f, variance);
+}
+
+plr_status plr_filter_diverge(plr_filter *f) {
+    f->totals.diverged_ns = f->belief.t_ns;
+    f->work.noise.open = 0; /* W is not added to P any more */
+    return PLR_E_DIVERGED;
+}
+
+plr_status plr_filter_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
+    const plr_status status = plr_covariance_close_noise(&f->belief, &f->camera, &f->work, nu);
+    return status == PLR_OK ? PLR_OK : plr_filter_diverge(f);
 }
 
 void plr_filter_recover(plr_filter *f) {
@@ -101,11 +126,11 @@ void plr_filter_recover(plr_filter *f) {
         plr_filter_propagate_recovery(f);
     unpack(f, P);
     plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P);
-    if (plr_sensitivity_is_finite(f))
-        plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P);
-    f->diverged = 0;
+    if (plr_sensitivity_is_finite(&f->belief))
+        plr_sensitivity_add_to(&f->belief, &f->camera, plr_row_of(&f->belief, PLR_BLOCK_POSE),
+                               PLR_POSE_DIM, P);
     f->totals.recoveries++;
     plr_filter_begin_anew(f, P, false);
-    plr_calibration_doubt(f);
+    plr_calibration_doubt(&f->camera);
     plr_filter_begin_prior_bias(f, 4); /* what is known of them may be what has broken down */
 }

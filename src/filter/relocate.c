@@ -17,7 +17,7 @@
 #include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
-#include "state/slots.h"
+#include "state/sightings.h"
 #include "supervise/supervise.h"
 
 enum { OFF_FRAMES = 10 }; /* successive frames, as for a locked gate */
@@ -35,16 +35,17 @@ enum { STEPS = 3 };
  * frame alone tells it better than all before: where each variance of the pose is at least this
  * multiple of the frame's. */
 #define WIDE_ENOUGH PLR_R(1)
-void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
+
+void plr_relocate_watch(plr_filter *f, const plr_sightings *sightings, unsigned unplaced) {
     unsigned seen = unplaced, off = unplaced;
-    if (!plr_map_is_asked(f))
+    if (!plr_map_is_asked(&f->config, &f->map))
         return;
-    for (unsigned k = 0; k < n; k++) {
-        const uint16_t slot = f->work.slot_of[k];
-        if (slot == PLR_NO_SLOT || !f->slots[slot].known)
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const plr_sighting *row = &sightings->at[k];
+        if (!plr_is_of_known(&f->belief, row))
             continue;
         seen++;
-        off += !plr_gate_accepted(f, slot);
+        off += !plr_gate_accepted(row);
     }
     if (seen < 2)
         return; /* says nothing */
@@ -57,42 +58,44 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
 /* ---------------------------------------------------------------- lost */
 
 /* Takes up the landmarks that agree; the others come in with the next frame. */
-static void take_up(plr_filter *f, const plr_frame *frame, const plr_seen_known *seen,
+static void take_up(plr_filter *f, const plr_sightings *sightings, const plr_seen_known *seen,
                     unsigned count) {
     for (unsigned i = 0; i < count; i++) {
-        const uint32_t id = frame->observations[f->work.order[seen[i].k]].id;
+        const uint32_t id = sightings->at[seen[i].k].seen->id;
         plr_landmark known;
         plr_new_landmark landmark;
-        if (seen[i].agrees && f->count < f->config.slots && plr_map_ask(f, id, &known) &&
-            plr_model_of(f)->adopt(f, &known, &landmark))
-            plr_slots_append(f, id, true, &landmark);
+        if (seen[i].agrees && f->belief.count < f->config.slots &&
+            plr_map_ask(&f->map, id, &known) &&
+            plr_model_of(&f->belief)->adopt(&f->belief, &f->camera, &f->motion, &known, &landmark))
+            plr_slots_append(&f->belief, id, true, &landmark);
     }
 }
 
-static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose *found) {
+static void begin_at(plr_filter *f, const plr_sightings *sightings, const plr_found_pose *found) {
     const bool again = plr_supervise_was_relocated(&f->supervisor);
     plr_real P[PLR_POSE_SQUARE];
-    memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
-    memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
+    memcpy(f->belief.R_WB, found->R_WB, sizeof f->belief.R_WB);
+    memcpy(f->belief.p_WB, found->p_WB, sizeof f->belief.p_WB);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = WIDER * found->P_xi[i];
     plr_filter_begin_anew(f, P, true);
     if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
         plr_filter_begin_prior_bias(f, 4);
-    plr_alignment_keep_world(f);
-    take_up(f, frame, plr_seen_known_of(f), found->count);
+    plr_alignment_keep_world(&f->source);
+    take_up(f, sightings, plr_seen_known_of(f->work.Vt), found->count);
 }
 
-bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
+bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings,
                             plr_frame_events *events) {
     plr_found_pose found;
-    if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(f))
+    if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(&f->config, &f->map))
         return false;
     f->frames_off_the_map = 0;
-    events->lost_in_map = !plr_find_pose(f, frame, n, false, &found);
+    events->lost_in_map =
+        !plr_find_pose(&f->belief, &f->camera, &f->map, f->work.Vt, sightings, false, &found);
     if (events->lost_in_map)
         return false;
-    begin_at(f, frame, &found);
+    begin_at(f, sightings, &found);
     return true;
 }
 
@@ -106,44 +109,45 @@ static bool is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE],
         way += C[(PLR_POSE_DIM + 1) * i];
         turn += C[(PLR_POSE_DIM + 1) * (3 + i)];
     }
-    return way + turn * r2 > 2 * plr_stereo_max_bearing_variance(f) * r2;
+    return way + turn * r2 > 2 * plr_stereo_max_bearing_variance(&f->camera) * r2;
 }
 
 static bool slot_is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE],
                               unsigned slot) {
-    const plr_slot *s = &f->slots[slot];
+    const plr_slot *s = &f->belief.slots[slot];
     return s->known && is_uncertain(f, C, plr_dot3(s->x, s->x));
 }
 
 /* Known landmarks that the caller has inserted stay: they would not come in again. */
 static bool is_in_map(const plr_filter *f, unsigned slot) {
     plr_landmark known;
-    return f->slots[slot].known && plr_map_ask(f, f->slots[slot].id, &known);
+    return f->belief.slots[slot].known && plr_map_ask(&f->map, f->belief.slots[slot].id, &known);
 }
 
 void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
-    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
+    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(&f->config, &f->map))
         return;
-    for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
+    for (unsigned slot = f->belief.count; slot-- > 0;) /* backwards: removing moves the last */
         if (slot_is_uncertain(f, C, slot) && is_in_map(f, slot))
-            plr_slots_remove(f, slot);
+            plr_slots_remove(&f->belief, slot);
 }
 
 /* How many known landmarks in sight are too uncertain: by the pose if they have just come in
  * (`new_ones`), else by the motion since the last frame. */
-static unsigned count_uncertain(const plr_filter *f, unsigned n, unsigned *new_ones) {
+static unsigned count_uncertain(const plr_filter *f, const plr_sightings *sightings,
+                                unsigned *new_ones) {
     plr_real P_xi[PLR_POSE_SQUARE], motion[PLR_POSE_SQUARE];
     unsigned uncertain = 0;
     *new_ones = 0;
-    plr_motion_pose_covariance(f, P_xi);
-    plr_motion_covariance_by_state(f, motion);
+    plr_motion_pose_covariance(&f->belief, &f->motion, P_xi);
+    plr_motion_covariance_by_state(&f->belief, &f->motion, motion);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         motion[i] += f->motion.Q[i];
-    for (unsigned k = 0; k < n; k++) {
-        const uint16_t slot = f->work.slot_of[k];
-        if (slot == PLR_NO_SLOT || !f->slots[slot].known)
+    for (unsigned k = 0; k < sightings->count; k++) {
+        const unsigned slot = sightings->at[k].slot;
+        if (!plr_is_of_known(&f->belief, &sightings->at[k]))
             continue;
-        const bool is_new = plr_has_just_come_in(f, slot);
+        const bool is_new = plr_has_just_come_in(&f->belief, slot);
         const bool is = slot_is_uncertain(f, is_new ? P_xi : motion, slot);
         uncertain += is;
         *new_ones += is && is_new && is_in_map(f, slot);
@@ -153,21 +157,23 @@ static unsigned count_uncertain(const plr_filter *f, unsigned n, unsigned *new_o
 
 /* They come in again: all known landmarks, or those that have just come in. */
 static void drop_known(plr_filter *f, bool new_ones_alone) {
-    for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
-        if ((!new_ones_alone || plr_has_just_come_in(f, slot)) && is_in_map(f, slot))
-            plr_slots_remove(f, slot);
+    for (unsigned slot = f->belief.count; slot-- > 0;) /* backwards: removing moves the last */
+        if ((!new_ones_alone || plr_has_just_come_in(&f->belief, slot)) && is_in_map(f, slot))
+            plr_slots_remove(&f->belief, slot);
 }
 
 /* Moves the pose to where prediction and frame together have it: to the one that was found, less
  * what the prediction knows better. */
-static void move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap) {
-    for (unsigned step = 0; step < STEPS && !f->diverged; step++) {
+static plr_status move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap) {
+    plr_status status = PLR_OK;
+    for (unsigned step = 0; step < STEPS && status == PLR_OK; step++) {
         plr_real xi[PLR_POSE_DIM];
-        plr_pose_towards(f, found->R_WB, found->p_WB, xi);
+        plr_pose_towards(&f->belief, found->R_WB, found->p_WB, xi);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             xi[k] -= gap->back[k];
-        plr_correct_towards(f, xi);
+        status = plr_correct_towards(f, xi);
     }
+    return status;
 }
 
 /* The pose that was found, with the covariance P. Velocity, biases and landmarks keep what they
@@ -175,10 +181,10 @@ static void move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_g
 static void replace_pose(plr_filter *f, const plr_found_pose *found,
                          const plr_real P[PLR_POSE_SQUARE]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
-    memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
-    memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
-    plr_covariance_forget(f, PLR_BLOCK_POSE, none);
-    plr_covariance_add(f, PLR_BLOCK_POSE, P);
+    memcpy(f->belief.R_WB, found->R_WB, sizeof f->belief.R_WB);
+    memcpy(f->belief.p_WB, found->p_WB, sizeof f->belief.p_WB);
+    plr_covariance_forget(&f->belief, PLR_BLOCK_POSE, none);
+    plr_covariance_add(&f->belief, PLR_BLOCK_POSE, P);
 }
 
 static bool is_far(const plr_pose_gap *gap) {
@@ -188,20 +194,19 @@ static bool is_far(const plr_pose_gap *gap) {
 /* Moves to the pose that was found, by which the landmarks come in. If it is too far, what was
  * believed of the pose was wrong, and tells nothing of biases and velocity. P_wide: of a pose that
  * replaces the present one. */
-static plr_relocation go_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap,
-                            bool replaces, const plr_real P_wide[PLR_POSE_SQUARE],
-                            plr_frame_events *events) {
-    if (replaces || is_far(gap))
-        replace_pose(f, found, P_wide);
-    else
-        move_to(f, found, gap);
+static plr_status go_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap,
+                        bool replaces, const plr_real P_wide[PLR_POSE_SQUARE],
+                        plr_frame_events *events) {
+    if (!replaces && !is_far(gap))
+        return move_to(f, found, gap);
+    replace_pose(f, found, P_wide);
     if (!is_far(gap))
-        return PLR_MOVED;
+        return PLR_OK;
     f->totals.widened++;
     events->moved_far = true;
     memcpy(events->far_xi, gap->xi, sizeof events->far_xi);
     memcpy(events->far_nu, gap->nu, sizeof events->far_nu);
-    return PLR_MOVED;
+    return PLR_OK;
 }
 
 /* False of a pose that is known exactly along an axis: there is no moving it. */
@@ -212,37 +217,44 @@ static bool is_regular(const plr_real P[PLR_POSE_SQUARE]) {
 }
 
 /* Where the frame tells more of the pose than was known. */
-static bool is_told_by_frame(plr_filter *f, const plr_frame *frame, unsigned n,
-                             plr_found_pose *found, plr_pose_gap *gap) {
-    return plr_find_pose(f, frame, n, true, found) && plr_find_gap(f, found, gap) &&
+static bool is_told_by_frame(plr_filter *f, const plr_sightings *sightings, plr_found_pose *found,
+                             plr_pose_gap *gap) {
+    return plr_find_pose(&f->belief, &f->camera, &f->map, f->work.Vt, sightings, true, found) &&
+           plr_find_gap(&f->belief, &f->camera, &f->motion, found, gap) &&
            !(gap->least < WIDE_ENOUGH);
 }
 
-plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n,
-                                           plr_frame_events *events) {
+plr_status plr_relocate_when_uncertain(plr_filter *f, const plr_sightings *sightings,
+                                       plr_frame_events *events, plr_relocation *what) {
     plr_found_pose found;
     plr_pose_gap gap;
     plr_real P[PLR_POSE_SQUARE];
     unsigned new_ones;
-    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
-        return PLR_PLACED;
-    const unsigned uncertain = count_uncertain(f, n, &new_ones);
-    if (uncertain >= PLR_PLACING_LEAST && is_told_by_frame(f, frame, n, &found, &gap)) {
+    plr_status status;
+    *what = PLR_PLACED;
+    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(&f->config, &f->map))
+        return PLR_OK;
+    const unsigned uncertain = count_uncertain(f, sightings, &new_ones);
+    if (uncertain >= PLR_PLACING_LEAST && is_told_by_frame(f, sightings, &found, &gap)) {
         for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
             P[i] = WIDER * found.P_xi[i];
         drop_known(f, false);
-        plr_predict_apply_prior(f);
-        return go_to(f, &found, &gap, gap.largest > PLR_TOO_WIDE, P, events);
+        *what = PLR_MOVED;
+        status = plr_predict_apply_prior(f);
+        return status != PLR_OK ? status
+                                : go_to(f, &found, &gap, gap.largest > PLR_TOO_WIDE, P, events);
     }
-    plr_motion_pose_covariance(f, P);
+    plr_motion_pose_covariance(&f->belief, &f->motion, P);
     if (new_ones == 0 || !is_regular(P))
-        return PLR_PLACED;
-    const bool tells =
-        plr_find_likeliest_pose(f, frame, n, &found) && plr_find_gap(f, &found, &gap);
+        return PLR_OK;
+    const bool tells = plr_find_likeliest_pose(&f->belief, &f->camera, &f->motion, &f->map,
+                                               f->work.Vt, sightings, &found) &&
+                       plr_find_gap(&f->belief, &f->camera, &f->motion, &found, &gap);
     drop_known(f, true);
     events->lost_in_map = !tells;
+    *what = tells ? PLR_MOVED : PLR_LEFT_OUT;
     if (!tells)
-        return PLR_LEFT_OUT;
-    plr_predict_apply_prior(f);
-    return go_to(f, &found, &gap, false, P, events);
+        return PLR_OK;
+    status = plr_predict_apply_prior(f);
+    return status != PLR_OK ? status : go_to(f, &found, &gap, false, P, events);
 }

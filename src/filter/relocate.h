@@ -12,7 +12,7 @@
 
 /* Counts the successive frames that rejected nearly all known landmarks in sight. Call it after the
  * gate. `unplaced`: known landmarks in sight that could not be taken up at the predicted pose. */
-void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced);
+void plr_relocate_watch(plr_filter *f, const plr_sightings *sightings, unsigned unplaced);
 
 /* Where the pose is lost: after each ten frames of plr_relocate_watch. If the known landmarks of
  * this frame tell a pose, and at least four of them and three fifths of those in sight agree on it,
@@ -21,7 +21,7 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced);
  * frame. If it comes to that again before the pose is out of doubt, an IMU's biases begin at their
  * prior, too. (Twists that are wrong would teach theirs.) If no pose is found,
  * events->lost_in_map. Works in work.Vt. */
-bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
+bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings,
                             plr_frame_events *events);
 
 typedef enum plr_relocation {
@@ -36,9 +36,10 @@ typedef enum plr_relocation {
  * axis of the pose than was known, by the frame alone, else by those that have just come in and
  * what was known (if no pose fits, they are left out of this frame). P is not reduced by it, and
  * the frame is used as any other. events->moved_far if the pose was further off than its covariance
- * says. Works in work.Vt. */
-plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n,
-                                           plr_frame_events *events);
+ * says. Works in work.Vt. PLR_E_DIVERGED as plr_predict_apply. Slots of rows are others, unless *what is
+ * PLR_PLACED. */
+plr_status plr_relocate_when_uncertain(plr_filter *f, const plr_sightings *sightings,
+                                       plr_frame_events *events, plr_relocation *what);
 
 /* The pose's covariance has been enlarged by C. What known landmarks say about the pose has been
  * used already, so those that stay in the state would not reduce it again. Removes those whose

@@ -30,17 +30,17 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     const plr_status status = check_moved(f, P_moved);
     if (status != PLR_OK)
         return plr_filter_refuse(f, status);
-    plr_alignment_follow_clock(f, t_ns);
-    f->t_ns = t_ns;
+    plr_alignment_follow_clock(&f->belief, &f->source, t_ns);
+    f->belief.t_ns = t_ns;
     plr_filter_forget_reading(f); /* an earlier one is not valid any more */
     plr_supervise_clock_set(&f->supervisor);
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY)) { /* it is not what it was then */
-        const plr_real v = f->par.start_velocity_variance, variance[3] = {v, v, v};
-        memset(f->inertial.velocity, 0, sizeof f->inertial.velocity);
-        plr_covariance_forget(f, PLR_BLOCK_VELOCITY, variance);
+    if (plr_has_block(&f->belief, PLR_BLOCK_VELOCITY)) { /* it is not what it was then */
+        const plr_real v = f->source.start_velocity_variance, variance[3] = {v, v, v};
+        memset(f->belief.velocity, 0, sizeof f->belief.velocity);
+        plr_covariance_forget(&f->belief, PLR_BLOCK_VELOCITY, variance);
     }
-    for (unsigned slot = 0; slot < f->count; slot++)
-        f->slots[slot].anchored = 0;
+    for (unsigned slot = 0; slot < f->belief.count; slot++)
+        f->belief.slots[slot].anchored = 0;
     if (!P_moved) {
         plr_guard_seal_whole(f);
         return PLR_OK;

@@ -26,13 +26,13 @@ static plr_real huber(plr_real d2) {
     return d2 <= HUBER * HUBER ? d2 : PLR_R(2) * HUBER * PLR_SQRT(d2) - HUBER * HUBER;
 }
 
-/* V and P of one sighting, which do not change during the search. */
+/* V and P of one residual, which do not change during the search. */
 static void prepare(plr_search *s, unsigned i, const plr_real Kt[PLR_MOTION_BY]) {
     plr_filter *f = s->f;
-    plr_sighting *at = &s->sightings[i];
-    const unsigned slot = f->work.slot_of[f->work.used[i]];
-    plr_covariance_motion_share(f, plr_covariance_row(f, slot), Kt, at->V);
-    plr_covariance_landmark(f, slot, at->P);
+    plr_residual *at = &s->residuals[i];
+    const unsigned slot = plr_search_row(s, i)->slot;
+    plr_covariance_motion_share(&f->belief, plr_covariance_row(&f->belief, slot), Kt, at->V);
+    plr_covariance_landmark(&f->belief, slot, at->P);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)
             for (unsigned k = 0; k < PLR_POSE_DIM; k++)
@@ -62,23 +62,23 @@ typedef struct plr_camera_step {
 
 static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_camera_step *step) {
     plr_applied_motion m;
-    plr_motion_at(s->f, &s->prior, z, &m);
-    plr_camera_motion(step->E, step->p, &s->f->par.camera, m.E, m.p);
+    plr_motion_at(&s->f->motion, &s->prior, z, &m);
+    plr_camera_motion(step->E, step->p, &s->f->camera.given, m.E, m.p);
     plr_se3_rotation(step->R, step->E);
     memcpy(step->z, z, sizeof step->z);
-    plr_mat6_mul(step->N, s->f->par.Ad_CB, m.JL);
+    plr_mat6_mul(step->N, s->f->camera.Ad_CB, m.JL);
 }
 
 /* Evaluates one observation at a point: U on trial, a and e. False if it cannot be predicted
  * there. */
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step *step) {
     const plr_slot *slot = plr_search_slot(s, i);
-    plr_sighting *at = &s->sightings[i];
+    plr_residual *at = &s->residuals[i];
     plr_stereo_prediction sight;
     plr_real dq[PLR_ROWS * PLR_POSE_DIM], JP[9], full[9], dz[PLR_ROWS * PLR_POSE_DIM] = {0},
                                                                         shift[3] = {0};
     plr_real S[6];
-    if (!plr_stereo_predict_after(s->f, slot, plr_search_observation(s, i), step->E, step->R,
+    if (!plr_stereo_predict_after(&s->f->camera, slot, plr_search_row(s, i)->seen, step->E, step->R,
                                   step->p, &sight))
         return false;
     const plr_real *J = sight.J;
@@ -86,7 +86,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     plr_mat3_mul_nt(full, JP, J);
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++)
-            S[k++] = full[3 * c + r] + (r == c ? plr_stereo_variance(s->f, r) : PLR_R(0));
+            S[k++] = full[3 * c + r] + (r == c ? plr_stereo_variance(&s->f->camera, r) : PLR_R(0));
     if (!plr_cholesky3(S))
         return false;
     plr_gemm_nn(3, PLR_POSE_DIM, 3, J, 3, at->V, PLR_POSE_DIM, dz, PLR_POSE_DIM);
@@ -102,7 +102,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     plr_solve3_transposed(1, S, at->e);
     at->range_change = 0;
     at->range_variance = at->P[8];
-    if (plr_stereo_improves_range(s->f, J, at->P)) {
+    if (plr_stereo_improves_range(&s->f->camera, J, at->P)) {
         plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
         at->range_change = plr_dot3(column, at->e);
@@ -113,7 +113,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
 }
 
 /* |U^-T r|^2 with U of the best point and the residual r = U'^T e of the point on trial. */
-static plr_real d2_by_best_covariance(const plr_sighting *at, unsigned best) {
+static plr_real d2_by_best_covariance(const plr_residual *at, unsigned best) {
     plr_real r[3];
     plr_multiply3_transposed(r, at->U[1 - best], at->e);
     plr_solve3_transposed(1, at->U[best], r);
@@ -121,7 +121,7 @@ static plr_real d2_by_best_covariance(const plr_sighting *at, unsigned best) {
 }
 
 /* J += w a^T a, b += w a^T e */
-static void add_to_sums(const plr_sighting *at, plr_search_point *point) {
+static void add_to_sums(const plr_residual *at, plr_search_point *point) {
     plr_real *J = point->J;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real column[3] = {at->a[k], at->a[PLR_POSE_DIM + k], at->a[2 * PLR_POSE_DIM + k]};
@@ -134,9 +134,11 @@ static void add_to_sums(const plr_sighting *at, plr_search_point *point) {
     }
 }
 
-void plr_search_add(plr_search *s, plr_real active) {
+void plr_search_add(plr_search *s, unsigned row, plr_real active) {
     static const plr_real identity[6] = {1, 0, 0, 1, 0, 1};
-    plr_sighting *at = &s->sightings[s->count++];
+    PLR_ASSERT(s->count < s->f->belief.count && plr_is_matched(&s->sightings->at[row]));
+    plr_residual *at = &s->residuals[s->count++];
+    at->row = (uint16_t)row;
     memcpy(at->U[s->current], identity, sizeof at->U[0]);
     at->active = active;
     at->trimmed = false;
@@ -145,7 +147,7 @@ void plr_search_add(plr_search *s, plr_real active) {
 
 void plr_search_prepare(plr_search *s) {
     plr_real K[PLR_MOTION_BY], Kt[PLR_MOTION_BY];
-    plr_motion_by_drivers(s->f, s->prior.L, K);
+    plr_motion_by_drivers(&s->f->belief, &s->f->motion, s->prior.L, K);
     plr_motion_transpose(K, Kt);
     for (unsigned i = 0; i < s->count; i++)
         prepare(s, i, Kt);
@@ -161,7 +163,7 @@ static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_sear
     memset(point, 0, sizeof *point);
     memcpy(point->z, z, sizeof point->z);
     for (unsigned i = 0; i < s->count; i++) {
-        plr_sighting *at = &s->sightings[i];
+        plr_residual *at = &s->residuals[i];
         at->weight = 0;
         at->behind = !evaluate_one(s, i, &step);
         if (at->behind) {
@@ -182,7 +184,7 @@ static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_sear
 static void accept(plr_search *s) {
     s->current = 1 - s->current;
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].cost = huber(plr_dot3(s->sightings[i].e, s->sightings[i].e));
+        s->residuals[i].cost = huber(plr_dot3(s->residuals[i].e, s->residuals[i].e));
 }
 
 void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best) {
@@ -254,12 +256,12 @@ void plr_search_descend(plr_search *s, plr_search_point *best) {
         plr_search_again(s, best);
 }
 
-/* Of those that take part, how many fit the best point better than sighting i. */
+/* Of those that take part, how many fit the best point better than residual i. */
 static unsigned count_better(const plr_search *s, unsigned i) {
-    const plr_real cost = s->sightings[i].cost;
+    const plr_real cost = s->residuals[i].cost;
     unsigned better = 0;
     for (unsigned j = 0; j < s->count; j++) {
-        const plr_sighting *other = &s->sightings[j];
+        const plr_residual *other = &s->residuals[j];
         better += other->active > 0 && (other->cost < cost || (other->cost <= cost && j < i));
     }
     return better;
@@ -269,9 +271,9 @@ static unsigned count_better(const plr_search *s, unsigned i) {
 static void trim_worst(plr_search *s) {
     unsigned active = 0;
     for (unsigned i = 0; i < s->count; i++)
-        active += s->sightings[i].active > 0;
+        active += s->residuals[i].active > 0;
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].trimmed = s->sightings[i].behind || 5 * count_better(s, i) >= 3 * active;
+        s->residuals[i].trimmed = s->residuals[i].behind || 5 * count_better(s, i) >= 3 * active;
 }
 
 void plr_search_concentrate(plr_search *s, plr_search_point *best) {
@@ -281,7 +283,7 @@ void plr_search_concentrate(plr_search *s, plr_search_point *best) {
         plr_search_descend(s, best);
     }
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].trimmed = false;
+        s->residuals[i].trimmed = false;
     plr_search_again(s, best);
 }
 

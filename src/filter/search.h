@@ -10,9 +10,10 @@
 
 #include "pelorus/state.h"
 #include "state/motion.h"
+#include "state/sightings.h"
 
-/* One matched observation. "Last point" is the nu at which it was evaluated last. */
-typedef struct plr_sighting {
+/* A matched observation as a term of the sum. "Last point" is the nu at which it was evaluated last. */
+typedef struct plr_residual {
     plr_real V[PLR_ROWS * PLR_POSE_DIM]; /* covariance of landmark and nu: P_(i,b) B^T L^-T, 3x6 */
     plr_real P[9];                       /* the landmark's covariance if nu were known */
     plr_real U[2][6]; /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
@@ -24,19 +25,20 @@ typedef struct plr_sighting {
     plr_real weight;         /* Huber's: 1, and less for a large residual */
     plr_real cost;           /* Huber's rho at the best point */
     plr_real prior_d2;       /* d^2 about the twists' prediction; negative: too uncertain */
-    plr_real gain;           /* det S of that prediction */
+    plr_real det_S;          /* of that prediction */
     plr_real active;         /* 1: takes part in the search; 0: a known landmark, or excluded */
     bool behind;             /* at the last point the landmark lies behind the camera */
     bool uncertain;          /* the prediction is too uncertain for a linear correction */
     bool trimmed;            /* takes no part for now: it fits the last point worst */
+    uint16_t row;            /* of the frame */
     plr_real twist_d2;       /* |e|^2 at the result of the search with the twists */
-} plr_sighting;
+} plr_residual;
 
 /* The search for nu. */
 typedef struct plr_search {
     plr_filter *f;
-    const plr_frame *frame;
-    plr_sighting *sightings; /* in work.Vt, which is free until the motion is applied */
+    const plr_sightings *sightings;
+    plr_residual *residuals; /* in work.Vt, which is free until the motion is applied */
     unsigned count;
     unsigned current; /* which U belongs to the best point */
     plr_applied_motion prior;
@@ -50,36 +52,34 @@ typedef struct plr_search_point {
     plr_real b[PLR_POSE_DIM];                          /* sum of w a^T e */
 } plr_search_point;
 
-static inline const plr_observation *plr_search_observation(const plr_search *s, unsigned i) {
-    const plr_workspace *w = &s->f->work;
-    return &s->frame->observations[w->order[w->used[i]]];
+static inline const plr_sighting *plr_search_row(const plr_search *s, unsigned i) {
+    PLR_ASSERT(i < s->count && s->residuals[i].row < s->sightings->count);
+    return &s->sightings->at[s->residuals[i].row];
 }
 
 static inline plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
-    const plr_workspace *w = &s->f->work;
-    return &s->f->slots[w->slot_of[w->used[i]]];
+    return plr_slot_of(&s->f->belief, plr_search_row(s, i));
 }
 
-/* Appends the observation work.used[s->count]. `active` is 1 if it takes part in the search, else
- * 0. */
-void plr_search_add(plr_search *s, plr_real active);
+/* Appends a matched row of the frame. `active` is 1 if it takes part in the search, else 0. */
+void plr_search_add(plr_search *s, unsigned row, plr_real active);
 
-/* Fills the fields of all sightings that depend on s->prior alone: V and P. */
+/* Fills the fields of all residuals that depend on s->prior alone: V and P. */
 void plr_search_prepare(plr_search *s);
 
-/* Prepares all sightings for s->prior and evaluates nu = 0, which becomes the best point. */
+/* Prepares all residuals for s->prior and evaluates nu = 0, which becomes the best point. */
 void plr_search_from_zero(plr_search *s, plr_search_point *best);
 
 /* Improves the best point by a bounded number of trials, each accepted only if the cost falls. At
- * the end all sightings are evaluated at the best point. */
+ * the end all residuals are evaluated at the best point. */
 void plr_search_descend(plr_search *s, plr_search_point *best);
 
 /* The motion on which three fifths agree, though the others are off by any amount: twice, sets the two
  * fifths out that fit the best point worst, and descends without them (concentration steps of least
- * trimmed squares). At the end all sightings are evaluated at the best point. */
+ * trimmed squares). At the end all residuals are evaluated at the best point. */
 void plr_search_concentrate(plr_search *s, plr_search_point *best);
 
-/* Evaluates all sightings at nu = z, which becomes the best point. */
+/* Evaluates all residuals at nu = z, which becomes the best point. */
 void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best);
 
 /* Evaluates them at the best point again, when something else has changed. */

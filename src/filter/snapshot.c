@@ -72,18 +72,18 @@ enum {
 #define SIZE(table) plr_codec_size(table##_fields, sizeof table##_fields / sizeof *table##_fields)
 
 static uint32_t elements(const plr_filter *f, unsigned landmarks) {
-    return (uint32_t)plr_covariance_size(f, landmarks);
+    return (uint32_t)plr_covariance_size(&f->belief, landmarks);
 }
 
 /* Of one column of the sensitivity. */
 static uint32_t rows(const plr_filter *f, unsigned landmarks) {
-    return (uint32_t)plr_covariance_row(f, landmarks);
+    return (uint32_t)plr_covariance_row(&f->belief, landmarks);
 }
 
 /* Behind the sensitivity: by how much each error has been corrected; the covariance's factor, a row of each
  * by those that are estimated; and of these D, how white their residuals are, and misfits. `f` NULL: it is skipped. */
-static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *errors) {
-    plr_calibration_estimate *to = f ? &f->calibration : NULL;
+static void pass_calibration(plr_codec *c, plr_filter *f, const plr_error_columns *errors) {
+    plr_camera_estimate *to = f ? &f->camera.estimate : NULL;
     const unsigned estimated = plr_calibration_estimated(errors);
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->moved : NULL, errors->count);
     for (unsigned k = 0; k < errors->count; k++)
@@ -98,13 +98,14 @@ static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *
 
 /* P, the sensitivity, and what has become of the calibration. */
 static void pass_covariance(plr_codec *c, plr_filter *f) {
-    plr_codec_numbers(c, PLR_FIELD_REAL, (void *)plr_covariance_elements(f), elements(f, f->count));
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
-    pass_calibration(c, f, &f->par.calibrated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, (void *)plr_covariance_elements(&f->belief),
+                      elements(f, f->belief.count));
+    for (unsigned k = 0; k < f->camera.errors.count; k++)
+        plr_codec_numbers(c, PLR_FIELD_REAL, f->belief.S[k], rows(f, f->belief.count));
+    pass_calibration(c, f, &f->camera.errors);
 }
 
-static uint32_t calibration_size(const plr_calibrated *errors) {
+static uint32_t calibration_size(const plr_error_columns *errors) {
     const uint32_t estimated = plr_calibration_estimated(errors);
     return (errors->count * (1 + estimated) + 4 * estimated) * (uint32_t)sizeof(plr_real) +
            estimated;
@@ -115,9 +116,9 @@ uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
         return 0;
     return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
            SIZE(time) + SIZE(pose) + SIZE(filter) + landmarks * SIZE(slot) +
-           (elements(f, landmarks) + f->par.calibrated.count * rows(f, landmarks)) *
+           (elements(f, landmarks) + f->camera.errors.count * rows(f, landmarks)) *
                (uint32_t)sizeof(plr_real) +
-           calibration_size(&f->par.calibrated);
+           calibration_size(&f->camera.errors);
 }
 
 /* What the state belongs to: build, settings, camera. */
@@ -131,7 +132,7 @@ static void pass_origin(plr_codec *c, const plr_filter *f) {
         PASS(c, &setting, setting);
     }
     if (!c->differs)
-        PASS(c, &f->par.camera, camera);
+        PASS(c, &f->camera.given, camera);
 }
 
 /* ---------------------------------------------------------------- save */
@@ -165,24 +166,24 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
     const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
-    if (f->diverged || !plr_covariance_is_positive(f))
+    if (!plr_covariance_is_positive(&f->belief))
         return PLR_E_DIVERGED;
     plr_state_out out = {.sink = sink, .context = context};
     plr_codec c = {.direction = sink ? PLR_CODEC_WRITE : PLR_CODEC_CHECK,
                    .finite = true,
                    .move = to_sink,
                    .context = &out};
-    const plr_state_count count = {f->count};
+    const plr_state_count count = {f->belief.count};
     plr_state_pose pose;
-    memcpy(pose.R_WB, f->R_WB, sizeof pose.R_WB);
-    memcpy(pose.p_WB, f->p_WB, sizeof pose.p_WB);
+    memcpy(pose.R_WB, f->belief.R_WB, sizeof pose.R_WB);
+    memcpy(pose.p_WB, f->belief.p_WB, sizeof pose.p_WB);
     pass_origin(&c, f);
     PASS(&c, &count, count);
     PASS(&c, f, time);
     PASS(&c, &pose, pose);
     PASS(&c, f, filter);
-    for (unsigned slot = 0; slot < f->count; slot++)
-        PASS(&c, &f->slots[slot], slot);
+    for (unsigned slot = 0; slot < f->belief.count; slot++)
+        PASS(&c, &f->belief.slots[slot], slot);
     pass_covariance(&c, (plr_filter *)f);
     if (c.status == PLR_OK && !flush(&out))
         c.status = PLR_E_IO;
@@ -225,7 +226,7 @@ static plr_status as_stored(const plr_codec *c) {
 }
 
 /* Checks covariance and sensitivity without storing them: finite numbers, variances not negative. */
-static plr_status check_covariance(plr_codec *c, unsigned dim, const plr_calibrated *errors) {
+static plr_status check_covariance(plr_codec *c, unsigned dim, const plr_error_columns *errors) {
     for (unsigned i = 0; i < dim && c->status == PLR_OK; i++) {
         plr_real variance = 0;
         plr_codec_numbers(c, PLR_FIELD_REAL, NULL, i);
@@ -245,8 +246,8 @@ static plr_status read_pose(plr_codec *c, plr_filter *f) {
     if (c->status == PLR_OK && !plr_guard_is_pose(pose.R_WB, pose.p_WB))
         return PLR_E_CORRUPT;
     if (f) {
-        memcpy(f->R_WB, pose.R_WB, sizeof f->R_WB);
-        memcpy(f->p_WB, pose.p_WB, sizeof f->p_WB);
+        memcpy(f->belief.R_WB, pose.R_WB, sizeof f->belief.R_WB);
+        memcpy(f->belief.p_WB, pose.p_WB, sizeof f->belief.p_WB);
     }
     return as_stored(c);
 }
@@ -259,7 +260,7 @@ static plr_status read_slot(plr_codec *c, plr_filter *f, const plr_filter *like,
     if (c->status == PLR_OK && !plr_guard_is_landmark(like, &slot))
         return PLR_E_CORRUPT;
     if (f)
-        memcpy(&f->slots[number], &slot, sizeof slot);
+        memcpy(&f->belief.slots[number], &slot, sizeof slot);
     return as_stored(c);
 }
 
@@ -282,13 +283,12 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     PASS(c, f, time);
     plr_status status = read_pose(c, f);
     if (f)
-        plr_calibration_forget(f);
+        plr_calibration_forget(&f->camera);
     PASS(c, f, filter);
     if (f) {
-        f->count = count.landmarks;
-        f->diverged = 0;
-        plr_velocity_forget(f); /* their clock is not the one that goes on */
-        memset(f->slots, 0, sizeof f->slots);
+        f->belief.count = count.landmarks;
+        plr_velocity_forget(&f->belief, &f->source); /* their clock is not the one that goes on */
+        memset(f->belief.slots, 0, sizeof f->belief.slots);
         plr_supervise_restored(&f->supervisor);
     }
     for (unsigned slot = 0; slot < count.landmarks && status == PLR_OK; slot++)
@@ -296,10 +296,10 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     if (status != PLR_OK)
         return status;
     if (!f)
-        return check_covariance(c, plr_covariance_row(like, count.landmarks),
-                                &like->par.calibrated);
+        return check_covariance(c, plr_covariance_row(&like->belief, count.landmarks),
+                                &like->camera.errors);
     pass_covariance(c, f);
-    return plr_calibration_is_sound(f) ? as_stored(c) : PLR_E_CORRUPT;
+    return plr_calibration_is_sound(&f->camera) ? as_stored(c) : PLR_E_CORRUPT;
 }
 
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,

@@ -5,6 +5,9 @@
 #define PLR_KNOWN_MAP_FIND_H
 
 #include "known_map/placing.h"
+#include "pelorus/belief.h"
+#include "pelorus/map.h"
+#include "pelorus/workspace.h"
 
 /* A pose that known landmarks in sight agree on. */
 typedef struct plr_found_pose {
@@ -25,25 +28,28 @@ typedef struct plr_pose_gap {
  * update would take more digits off P than float32 has. */
 #define PLR_TOO_WIDE PLR_R(1e4)
 
-static inline bool plr_has_just_come_in(const plr_filter *f, unsigned slot) {
-    return f->slots[slot].known && f->slots[slot].times_seen == 0;
+static inline bool plr_has_just_come_in(const plr_belief *belief, unsigned slot) {
+    return belief->slots[slot].known && belief->slots[slot].times_seen == 0;
 }
 
 /* The known landmarks that a pose was found by: in work.Vt. */
-static inline plr_seen_known *plr_seen_known_of(plr_filter *f) {
-    return (plr_seen_known *)(void *)f->work.Vt;
+static inline plr_seen_known *plr_seen_known_of(plr_real *Vt) {
+    return (plr_seen_known *)(void *)Vt;
 }
 
 /* By the frame alone; `guesses`: from the present pose. False if fewer than three fifths agree. */
-bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+bool plr_find_pose(const plr_belief *belief, const plr_camera_model *camera, const plr_map *map,
+                   plr_real *Vt, const plr_sightings *sightings, bool guesses,
                    plr_found_pose *found);
 
 /* By the landmarks that have just come in, and by what is known of the pose. False if there are none, or if
  * fewer than three fifths agree. found->P_xi is zero. */
-bool plr_find_likeliest_pose(plr_filter *f, const plr_frame *frame, unsigned n,
-                             plr_found_pose *found);
+bool plr_find_likeliest_pose(const plr_belief *belief, const plr_camera_model *camera,
+                             const plr_motion *motion, const plr_map *map, plr_real *Vt,
+                             const plr_sightings *sightings, plr_found_pose *found);
 
 /* Holds a pose that was found against the predicted one. False if P + P_found cannot be factorised. */
-bool plr_find_gap(const plr_filter *f, const plr_found_pose *found, plr_pose_gap *gap);
+bool plr_find_gap(const plr_belief *belief, const plr_camera_model *camera,
+                  const plr_motion *motion, const plr_found_pose *found, plr_pose_gap *gap);
 
 #endif

@@ -24,7 +24,7 @@ enum {
 #define TINY        PLR_R(1e-12)
 
 typedef struct plr_sights {
-    const plr_filter *f;
+    const plr_camera_model *camera;
     plr_seen_known *seen;
     unsigned count;
     const plr_placing *prior;              /* NULL: none */
@@ -43,21 +43,21 @@ typedef struct plr_normal {
  * False if the point would be too near, or behind. */
 static bool look(const plr_sights *s, const plr_seen_known *known, const plr_placing *at,
                  plr_real e[3], plr_real *J) {
-    const plr_filter *f = s->f;
+    const plr_camera_model *camera = s->camera;
     plr_real q[3], Dz[9], DzR[9], DzRP[9], S[9], U[6];
     plr_mat3_vec(q, at->R, known->w);
     for (unsigned i = 0; i < 3; i++)
         q[i] += at->t[i];
-    if (!(q[2] >= f->par.min_depth))
+    if (!(q[2] >= camera->min_depth))
         return false;
-    plr_stereo_project(e, &f->calibration.eye, q);
-    plr_stereo_jacobian(Dz, &f->calibration.eye, q);
+    plr_stereo_project(e, &camera->estimate.eye, q);
+    plr_stereo_jacobian(Dz, &camera->estimate.eye, q);
     plr_mat3_mul(DzR, Dz, at->R);
     plr_mat3_mul(DzRP, DzR, known->P);
     plr_mat3_mul_nt(S, DzRP, DzR);
     for (unsigned i = 0; i < 3; i++) {
         e[i] = known->z[i] - e[i];
-        S[4 * i] += plr_stereo_variance(f, i);
+        S[4 * i] += plr_stereo_variance(camera, i);
     }
     if (!plr_factorise3(U, S))
         return false;
@@ -186,7 +186,7 @@ static bool axes_of(const plr_real a[3], const plr_real b[3], const plr_real c[3
 static bool place_by_three(const plr_sights *s, const unsigned of[3], plr_placing *at) {
     plr_real q[3][3], Dq[9], in_camera[9], in_world[9], turned[3];
     for (unsigned k = 0; k < 3; k++)
-        plr_stereo_back_project(q[k], Dq, &s->f->calibration.eye, s->seen[of[k]].z);
+        plr_stereo_back_project(q[k], Dq, &s->camera->estimate.eye, s->seen[of[k]].z);
     if (!axes_of(q[0], q[1], q[2], in_camera) ||
         !axes_of(s->seen[of[0]].w, s->seen[of[1]].w, s->seen[of[2]].w, in_world))
         return false;
@@ -201,7 +201,7 @@ static bool place_by_three(const plr_sights *s, const unsigned of[3], plr_placin
 
 /* The points near enough for a sample of three. Returns how many. */
 static unsigned find_near(const plr_sights *s, uint8_t near[PLR_PLACING_MOST]) {
-    const plr_real sigma = PLR_SQRT(2 * plr_stereo_variance(s->f, 0));
+    const plr_real sigma = PLR_SQRT(2 * plr_stereo_variance(s->camera, 0));
     unsigned count = 0;
     for (unsigned i = 0; i < s->count; i++)
         if (s->seen[i].z[0] - s->seen[i].z[1] > DISPARITY_SIGMAS * sigma)
@@ -265,9 +265,9 @@ static unsigned place_by_samples(const plr_sights *s, unsigned most, plr_placing
     return most;
 }
 
-unsigned plr_place(const plr_filter *f, plr_seen_known *seen, unsigned count,
+unsigned plr_place(const plr_camera_model *camera, plr_seen_known *seen, unsigned count,
                    const plr_placing *guess, plr_placing *placing) {
-    const plr_sights s = {.f = f, .seen = seen, .count = count};
+    const plr_sights s = {.camera = camera, .seen = seen, .count = count};
     unsigned most = 0;
     plr_normal normal;
     if (guess) {
@@ -300,9 +300,9 @@ static void keep_regular(const plr_real P[PLR_POSE_SQUARE], plr_real U[PLR_POSE_
     }
 }
 
-unsigned plr_place_by_prior(const plr_filter *f, plr_seen_known *seen, unsigned count,
+unsigned plr_place_by_prior(const plr_camera_model *camera, plr_seen_known *seen, unsigned count,
                             const plr_placing *prior, plr_placing *placing) {
-    plr_sights s = {.f = f, .seen = seen, .count = count, .prior = prior};
+    plr_sights s = {.camera = camera, .seen = seen, .count = count, .prior = prior};
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
     plr_upper6_pack(U, prior->P_C);
     keep_regular(prior->P_C, U);

@@ -30,14 +30,15 @@ enum { THETA = 3, VEL = 6, ACCEL = 9, GYRO = 12, DIM = PLR_CORE_DIM, D = PLR_DRI
 enum { D_THETA = 0, D_VEL = 3, D_ACCEL = 6, D_GYRO = 9 };
 enum { MOVED = 9 }; /* rows that a step changes: rho, theta, v */
 
-static void lay_out(plr_filter *f) {
-    plr_lay_out(f, PLR_VELOCITY_DIM, PLR_BIAS_DIM, THETA);
+static void lay_out(plr_belief *belief, const plr_config *config) {
+    (void)config;
+    plr_lay_out(belief, PLR_VELOCITY_DIM, PLR_BIAS_DIM, THETA);
 }
 
 /* gamma = R_WB^T (0, 0, -g): gravity's acceleration in body axes, m/s^2. */
-static void gravity(const plr_filter *f, plr_real gamma[3]) {
+static void gravity(const plr_belief *belief, const plr_source *source, plr_real gamma[3]) {
     for (int i = 0; i < 3; i++)
-        gamma[i] = -f->par.gravity * f->R_WB[6 + i];
+        gamma[i] = -source->gravity * belief->R_WB[6 + i];
 }
 
 /* ---------------------------------------------------------------- one step */
@@ -60,16 +61,16 @@ static void series(plr_real G[9], plr_real c, plr_real s1, plr_real s2, const pl
         G[i] += c;
 }
 
-static void integrate(const plr_filter *f, const plr_real reading[PLR_READING_DIM], plr_real tau,
-                      plr_imu_step *s) {
+static void integrate(const plr_belief *belief, const plr_source *source,
+                      const plr_real reading[PLR_READING_DIM], plr_real tau, plr_imu_step *s) {
     plr_real phi[3], W[9], WW[9], g1[3], g2[3], next[3];
     plr_so3_series c;
     s->tau = tau;
     for (int i = 0; i < 3; i++) {
-        s->a[i] = reading[i] - f->bias[i];
-        phi[i] = tau * (reading[3 + i] - f->bias[3 + i]);
+        s->a[i] = reading[i] - belief->bias[i];
+        phi[i] = tau * (reading[3 + i] - belief->bias[3 + i]);
     }
-    gravity(f, s->gamma);
+    gravity(belief, source, s->gamma);
     plr_so3_series_at(&c, plr_dot3(phi, phi));
     plr_skew(W, phi);
     plr_mat3_mul(WW, W, W);
@@ -81,7 +82,7 @@ static void integrate(const plr_filter *f, const plr_real reading[PLR_READING_DI
             s->Et[3 * i + j] = s->E[3 * j + i] + (i == j ? PLR_R(1) : PLR_R(0));
     plr_mat3_vec(g1, s->G1, s->a);
     plr_mat3_vec(g2, s->G2, s->a);
-    const plr_real *v = f->inertial.velocity;
+    const plr_real *v = belief->velocity;
     for (int i = 0; i < 3; i++) {
         s->d[i] = tau * PLR_FMA(tau, PLR_FMA(PLR_R(0.5), s->gamma[i], g2[i]), v[i]);
         next[i] = PLR_FMA(tau, s->gamma[i] + g1[i], v[i]);
@@ -89,13 +90,13 @@ static void integrate(const plr_filter *f, const plr_real reading[PLR_READING_DI
     plr_mat3_vec(s->v, s->Et, next);
 }
 
-static plr_status check(const plr_filter *f, const plr_real reading[PLR_READING_DIM],
-                        plr_real seconds) {
+static plr_status check(const plr_belief *belief, const plr_source *source,
+                        const plr_real reading[PLR_READING_DIM], plr_real seconds) {
     plr_real turn2 = 0, way2 = 0;
     for (int i = 0; i < 3; i++) {
-        const plr_real turn = seconds * (reading[3 + i] - f->bias[3 + i]);
-        const plr_real way = seconds * (plr_abs(f->inertial.velocity[i]) +
-                                        seconds * (plr_abs(reading[i]) + f->par.gravity));
+        const plr_real turn = seconds * (reading[3 + i] - belief->bias[3 + i]);
+        const plr_real way = seconds * (plr_abs(belief->velocity[i]) +
+                                        seconds * (plr_abs(reading[i]) + source->gravity));
         turn2 += turn * turn;
         way2 += way * way;
     }
@@ -152,14 +153,14 @@ static void transition(const plr_imu_step *s, plr_real F[MOVED * DIM]) {
 }
 
 /* The derivatives of the whole motion by the drivers: B of its error n, V of the velocity. */
-static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
+static void accumulate_derivatives(plr_motion *motion, const plr_imu_step *s,
                                    const plr_real F[MOVED * DIM]) {
-    plr_real *B = f->motion.B, *V = f->core_motion.V, tau = s->tau;
+    plr_real *B = motion->B, *V = motion->core.V, tau = s->tau;
     plr_real theta[3 * D] = {0}, way[3 * D], speed[3 * D], cross[3];
     for (unsigned i = 0; i < 3; i++) { /* theta now by the drivers: R_D^T theta + B_theta */
         memcpy(theta + D * i, B + D * (THETA + i), D * sizeof *B);
         for (unsigned j = 0; j < 3; j++)
-            theta[D * i + D_THETA + j] += f->motion.E[3 * j + i] + (i == j ? PLR_R(1) : PLR_R(0));
+            theta[D * i + D_THETA + j] += motion->E[3 * j + i] + (i == j ? PLR_R(1) : PLR_R(0));
     }
     for (unsigned c = 0; c < D; c++) {
         const plr_real turned[3] = {theta[c], theta[D + c], theta[2 * D + c]};
@@ -188,10 +189,10 @@ static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
 }
 
 /* The covariance of the motion's noise: of n, velocity and biases together, 15 x 15. */
-static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
-    const plr_core_motion *m = &f->core_motion;
+static void get_noise(const plr_motion *motion, plr_real Q[DIM * DIM]) {
+    const plr_core_motion *m = &motion->core;
     for (unsigned i = 0; i < VEL; i++) {
-        memcpy(Q + DIM * i, f->motion.Q + PLR_POSE_DIM * i, PLR_POSE_DIM * sizeof *Q);
+        memcpy(Q + DIM * i, motion->Q + PLR_POSE_DIM * i, PLR_POSE_DIM * sizeof *Q);
         memcpy(Q + DIM * i + VEL, m->Q_nc + PLR_REST_DIM * i, PLR_REST_DIM * sizeof *Q);
     }
     for (unsigned i = 0; i < PLR_REST_DIM; i++) {
@@ -202,10 +203,10 @@ static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
     }
 }
 
-static void put_noise(plr_filter *f, const plr_real Q[DIM * DIM]) {
-    plr_core_motion *m = &f->core_motion;
+static void put_noise(plr_motion *motion, const plr_real Q[DIM * DIM]) {
+    plr_core_motion *m = &motion->core;
     for (unsigned i = 0; i < VEL; i++) {
-        memcpy(f->motion.Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
+        memcpy(motion->Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
         memcpy(m->Q_nc + PLR_REST_DIM * i, Q + DIM * i + VEL, PLR_REST_DIM * sizeof *Q);
     }
     for (unsigned i = 0; i < PLR_REST_DIM; i++)
@@ -249,9 +250,9 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
 /* The density of the accelerometer's (0) or the gyro's (1) noise, squared: as stated, or as the readings
  * scatter about their neighbours, if that is more. A vibration that is true motion counts, too: sampled so that
  * neighbours tell little of each other it cannot be integrated. */
-static plr_real density_of(const plr_filter *f, unsigned which) {
-    const plr_real stated = which == 0 ? f->par.accel_density : f->par.gyro_density;
-    const plr_real shown = f->inertial.scatter2[which] * f->inertial.usual_s;
+static plr_real density_of(const plr_source *source, unsigned which) {
+    const plr_real stated = which == 0 ? source->accel_density : source->gyro_density;
+    const plr_real shown = source->inertial.scatter2[which] * source->inertial.usual_s;
     return shown > stated ? shown : stated;
 }
 
@@ -263,16 +264,16 @@ static plr_real density_of(const plr_filter *f, unsigned which) {
  * gyro, which took the same blow, by all that it reads. The force is that of the whole interval: the rest of one
  * that a frame cut makes up for rounded stamps, too. A reading held for longer than usual is wrong by what
  * changes meanwhile: at first as successive readings differ, later as they scatter at all. */
-static void densities(const plr_filter *f, const plr_process_step *by, const plr_real gamma[3],
-                      plr_real density[2]) {
-    const plr_inertial *at = &f->inertial;
-    const plr_real g = f->par.gravity, scatter2 = UNLIKELY * at->scatter2[0];
+static void densities(const plr_belief *belief, const plr_source *source,
+                      const plr_process_step *by, const plr_real gamma[3], plr_real density[2]) {
+    const plr_inertial *at = &source->inertial;
+    const plr_real g = source->gravity, scatter2 = UNLIKELY * at->scatter2[0];
     plr_real forced[3], turned[3];
     for (unsigned i = 0; i < 2; i++)
-        density[i] = density_of(f, i);
+        density[i] = density_of(source, i);
     for (int i = 0; i < 3; i++) {
-        forced[i] = by->whole[i] - f->bias[i] + gamma[i];
-        turned[i] = by->whole[3 + i] - f->bias[3 + i];
+        forced[i] = by->whole[i] - belief->bias[i] + gamma[i];
+        turned[i] = by->whole[3 + i] - belief->bias[3 + i];
     }
     const plr_real beyond2 = plr_dot3(forced, forced) - (scatter2 > g * g ? scatter2 : g * g);
     if (beyond2 > 0) {
@@ -308,10 +309,10 @@ static inline void set_block(plr_real Q[DIM * DIM], const plr_real *X, const plr
 
 /* Q <- F Q F^T + noise. The noise of the readings, of variances `reading` (accelerometer, gyro),
  * enters as an error of the biases does that lasts for this step alone. */
-static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
+static void transport_noise(plr_motion *motion, const plr_real F[MOVED * DIM],
                             const plr_real reading[2]) {
     plr_real Q[DIM * DIM], X[MOVED * DIM];
-    get_noise(f, Q);
+    get_noise(motion, Q);
     transport_rows(&of_rho, F, Q, X);
     transport_rows(&of_theta, F, Q, X);
     transport_rows(&of_v, F, Q, X);
@@ -328,81 +329,81 @@ static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
     set_block(Q, X, F, &of_theta, &of_theta);
     set_block(Q, X, F, &of_v, &of_theta);
     set_block(Q, X, F, &of_v, &of_v);
-    put_noise(f, Q);
+    put_noise(motion, Q);
 }
 
-static void move_noise(plr_filter *f, const plr_imu_step *s, const plr_real F[MOVED * DIM],
+static void move_noise(const plr_belief *belief, plr_motion *motion, const plr_source *source,
+                       const plr_imu_step *s, const plr_real F[MOVED * DIM],
                        const plr_process_step *by) {
     const plr_real tau = s->tau;
     plr_real reading[2];
-    densities(f, by, s->gamma, reading);
+    densities(belief, source, by, s->gamma, reading);
     reading[0] /= tau;
     reading[1] /= tau;
-    transport_noise(f, F, reading);
+    transport_noise(motion, F, reading);
     for (unsigned i = ACCEL - VEL; i < PLR_REST_DIM; i++) {
-        plr_real *q = &f->core_motion.Q_cc[(PLR_REST_DIM + 1) * i];
-        *q = PLR_FMA(i < GYRO - VEL ? f->par.accel_walk : f->par.gyro_walk, tau, *q);
+        plr_real *q = &motion->core.Q_cc[(PLR_REST_DIM + 1) * i];
+        *q = PLR_FMA(i < GYRO - VEL ? source->accel_walk_variance : source->gyro_walk_variance, tau,
+                     *q);
     }
 }
 
-static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
+static void step(plr_belief *belief, plr_motion *motion, plr_source *source, plr_time_ns t_ns,
+                 const plr_process_step *by) {
     const plr_real seconds = by->seconds;
     plr_imu_step s;
     plr_real F[MOVED * DIM];
-    plr_motion *m = &f->motion;
-    integrate(f, by->mean, seconds, &s);
+    integrate(belief, source, by->mean, seconds, &s);
     transition(&s, F);
-    accumulate_derivatives(f, &s, F);
-    move_noise(f, &s, F, by);
-    plr_pose_move(f, s.E, s.d);
-    memcpy(f->inertial.velocity, s.v, sizeof s.v);
-    plr_se3_append(m->E, m->p, s.E, s.d);
-    plr_so3_orthonormalise_small(m->E);
-    f->t_ns = t_ns;
-    m->seconds += seconds;
-    m->pending = 1;
-    m->noisy = 1;
+    accumulate_derivatives(motion, &s, F);
+    move_noise(belief, motion, source, &s, F, by);
+    plr_pose_move(belief, s.E, s.d);
+    memcpy(belief->velocity, s.v, sizeof s.v);
+    plr_se3_append(motion->E, motion->p, s.E, s.d);
+    plr_so3_orthonormalise_small(motion->E);
+    belief->t_ns = t_ns;
+    motion->seconds += seconds;
+    motion->pending = 1;
+    motion->noisy = 1;
 }
 
 /* ---------------------------------------------------------------- readings */
 
-static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_process_step *step) {
-    const bool makes_up = plr_seconds(t_ns - f->reading_ns) <= BRIDGED_S;
-    plr_mean_reading(f, f->config.imu_timing, makes_up, t_ns, reading, step);
+static void mean(const plr_belief *belief, const plr_source *source, plr_time_ns t_ns,
+                 const plr_real reading[PLR_READING_DIM], plr_process_step *step) {
+    const bool makes_up = plr_seconds(t_ns - source->reading_ns) <= BRIDGED_S;
+    plr_mean_reading(belief, source, source->timing, makes_up, t_ns, reading, step);
 }
 
-/* The accumulated motion's noise holds the walk already. */
-static void walk(plr_filter *f, plr_real seconds) {
-    (void)f;
-    (void)seconds;
+static plr_real bias_walk(const plr_source *source, unsigned k) {
+    return k < 3 ? source->accel_walk_variance : source->gyro_walk_variance;
 }
 
-static plr_real bias_walk(const plr_filter *f, unsigned k) {
-    return k < 3 ? f->par.accel_walk : f->par.gyro_walk;
-}
-
-static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
+static void rest(const plr_belief *belief, const plr_source *source,
+                 plr_real reading[PLR_READING_DIM]) {
     plr_real gamma[3];
-    gravity(f, gamma);
+    gravity(belief, source, gamma);
     for (int i = 0; i < 3; i++) {
-        reading[i] = f->bias[i] - gamma[i];
-        reading[3 + i] = f->bias[3 + i];
+        reading[i] = belief->bias[i] - gamma[i];
+        reading[3 + i] = belief->bias[3 + i];
     }
 }
 
-static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
+static void hold(const plr_belief *belief, const plr_source *source, plr_real age,
+                 plr_real held[PLR_READING_DIM]) {
     if (age > STALE_S)
-        rest(f, held);
+        rest(belief, source, held);
     else
-        memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
+        memcpy(held, source->reading, PLR_READING_DIM * sizeof *held);
 }
 
 /* ---------------------------------------------------------------- the estimate */
 
-static PLR_SELDOM void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
-    const plr_real *Q = f->core_motion.Q_cc;
-    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+static PLR_SELDOM void bias_covariance(const plr_belief *belief, const plr_motion *motion,
+                                       const plr_source *source, plr_real P_b[PLR_POSE_SQUARE]) {
+    (void)source;
+    const plr_real *Q = motion->core.Q_cc;
+    plr_covariance_get(belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
             P_b[PLR_BIAS_DIM * i + j] +=
@@ -410,22 +411,23 @@ static PLR_SELDOM void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POS
 }
 
 /* v with its covariance now, and w = w_m - b_g, correlated by the gyro's bias. */
-static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
+static PLR_SELDOM void now(const plr_belief *belief, const plr_motion *motion,
+                           const plr_source *source, plr_real u[PLR_POSE_DIM],
                            plr_real P_u[PLR_POSE_SQUARE]) {
     enum { V = PLR_VELOCITY_DIM };
-    const plr_core_motion *m = &f->core_motion;
+    const plr_core_motion *m = &motion->core;
     plr_real P_dd[D * D], VP[V * D] = {0}, P_vv[V * V] = {0}, P_b[PLR_POSE_SQUARE];
     for (unsigned i = 0; i < V; i++) {
-        u[i] = f->inertial.velocity[i];
-        u[V + i] = f->reading[V + i] - f->bias[V + i];
+        u[i] = belief->velocity[i];
+        u[V + i] = source->reading[V + i] - belief->bias[V + i];
     }
     if (!P_u)
         return;
-    plr_covariance_with_drivers(f, f->layout.driver, D, P_dd);
+    plr_covariance_with_drivers(belief, belief->layout.driver, D, P_dd);
     plr_gemm_nn(V, D, D, m->V, D, P_dd, D, VP, D);
     plr_gemm_nt(V, V, D, VP, D, m->V, D, P_vv, V);
-    bias_covariance(f, P_b);
-    const plr_real density = density_of(f, 1), usual = f->inertial.usual_s;
+    bias_covariance(belief, motion, source, P_b);
+    const plr_real density = density_of(source, 1), usual = source->inertial.usual_s;
     const plr_real per_reading = usual > 0 ? density / usual : density;
     for (unsigned i = 0; i < V; i++)
         for (unsigned j = 0; j < V; j++) {
@@ -438,12 +440,13 @@ static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
 }
 
 /* a + gamma - w x v */
-static void changes(const plr_filter *f, const plr_real u[PLR_POSE_DIM], plr_real change[3]) {
+static void changes(const plr_belief *belief, const plr_source *source,
+                    const plr_real u[PLR_POSE_DIM], plr_real change[3]) {
     plr_real turning[3];
     plr_cross3(turning, u + 3, u);
-    gravity(f, change);
+    gravity(belief, source, change);
     for (int i = 0; i < 3; i++)
-        change[i] += f->reading[i] - f->bias[i] - turning[i];
+        change[i] += source->reading[i] - belief->bias[i] - turning[i];
 }
 
 /* The noise of the rate at a standstill is in theta too, where v = 0 finds it again: as if it were
@@ -453,27 +456,28 @@ static void changes(const plr_filter *f, const plr_real u[PLR_POSE_DIM], plr_rea
 /* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise
  * adds to it. A row of v and w together (a wheel) takes the last reading, for both change; a row of
  * w alone (a standstill) the mean since the last one, which has less noise. */
-static PLR_SELDOM void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
-                               plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
-    const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);
+static PLR_SELDOM void measure(const plr_belief *belief, const plr_source *source,
+                               const plr_twist_rows *rows, plr_rows *H, plr_real r[PLR_ROWS],
+                               plr_real R[PLR_ROWS]) {
+    const plr_real since = plr_seconds(belief->t_ns - source->inertial.still_ns);
     const plr_real most = since < PLR_R(0.5) ? since : PLR_R(0.5);
-    const plr_real usual = f->inertial.usual_s > 0 ? f->inertial.usual_s : PLR_R(1e-3);
-    const plr_real density = density_of(f, 1);
+    const plr_real usual = source->inertial.usual_s > 0 ? source->inertial.usual_s : PLR_R(1e-3);
+    const plr_real density = density_of(source, 1);
     /* at the time of the last such row the mean is used up: one reading's worth is granted */
     const plr_real mean_of = most > 0 ? most : usual;
     memset(H, 0, sizeof *H);
-    plr_real *by_v = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_VELOCITY), PLR_VELOCITY_DIM);
-    plr_real *by_bias = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
+    plr_real *by_v = plr_rows_add(H, plr_row_of(belief, PLR_BLOCK_VELOCITY), PLR_VELOCITY_DIM);
+    plr_real *by_bias = plr_rows_add(H, plr_row_of(belief, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real *M = rows->M + PLR_POSE_DIM * i;
         const bool moves = plr_dot3(M, M) > 0;
-        const plr_real *w_m = moves ? f->reading + 3 : f->inertial.slow + 3;
+        const plr_real *w_m = moves ? source->reading + 3 : source->inertial.slow + 3;
         const plr_real noise = moves ? density / usual : USED_TWICE * density / mean_of;
         r[i] = rows->z[i];
         R[i] = PLR_FMA(noise, plr_dot3(M + 3, M + 3), rows->R[i]);
         for (unsigned c = 0; c < 3; c++) {
-            const plr_real w = w_m[c] - f->bias[3 + c];
-            r[i] = PLR_FMA(-M[c], f->inertial.velocity[c], r[i]);
+            const plr_real w = w_m[c] - belief->bias[3 + c];
+            r[i] = PLR_FMA(-M[c], belief->velocity[c], r[i]);
             r[i] = PLR_FMA(-M[3 + c], w, r[i]);
             by_v[PLR_VELOCITY_DIM * i + c] = M[c];
             by_bias[PLR_BIAS_DIM * i + 3 + c] = -M[3 + c];
@@ -488,7 +492,6 @@ const plr_process plr_process_imu = {
     .mean = mean,
     .hold = hold,
     .rest = rest,
-    .walk = walk,
     .bias_walk = bias_walk,
     .now = now,
     .changes = changes,

@@ -6,6 +6,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -15,103 +16,108 @@
 /* An interval longer than usual by this many of the intervals' deviations lacks readings. */
 #define LATE_SIGMAS PLR_R(4)
 
-static void lay_out(plr_filter *f) {
-    plr_lay_out(f, 0, f->config.bias ? PLR_BIAS_DIM : 0, PLR_POSE_DIM);
+static void lay_out(plr_belief *belief, const plr_config *config) {
+    plr_lay_out(belief, 0, config->bias ? PLR_BIAS_DIM : 0, PLR_POSE_DIM);
 }
 
-static plr_real bias_walk(const plr_filter *f, unsigned k) {
-    return k < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk;
+static plr_real bias_walk(const plr_source *source, unsigned k) {
+    return k < 3 ? source->bias_velocity_walk : source->bias_gyro_walk;
 }
 
-static void walk(plr_filter *f, plr_real seconds) {
+static void walk(plr_belief *belief, const plr_source *source, plr_real seconds) {
     plr_real variance[PLR_BIAS_DIM];
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-        variance[i] = seconds * bias_walk(f, i);
-    plr_covariance_add_variance(f, PLR_BLOCK_BIAS, variance);
+        variance[i] = seconds * bias_walk(source, i);
+    plr_covariance_add_variance(belief, PLR_BLOCK_BIAS, variance);
 }
 
-static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
+static void bias_covariance(const plr_belief *belief, const plr_motion *motion,
+                            const plr_source *source, plr_real P_b[PLR_POSE_SQUARE]) {
     memset(P_b, 0, PLR_POSE_SQUARE * sizeof *P_b);
-    if (!plr_has_block(f, PLR_BLOCK_BIAS))
+    if (!plr_has_block(belief, PLR_BLOCK_BIAS))
         return;
-    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+    plr_covariance_get(belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-        P_b[(PLR_BIAS_DIM + 1) * i] += f->motion.seconds * bias_walk(f, i);
+        P_b[(PLR_BIAS_DIM + 1) * i] += motion->seconds * bias_walk(source, i);
 }
 
-static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
+static PLR_SELDOM void now(const plr_belief *belief, const plr_motion *motion,
+                           const plr_source *source, plr_real u[PLR_POSE_DIM],
                            plr_real P_u[PLR_POSE_SQUARE]) {
     for (int i = 0; i < PLR_POSE_DIM; i++)
-        u[i] = f->reading[i] - f->bias[i];
+        u[i] = source->reading[i] - belief->bias[i];
     if (!P_u)
         return;
     /* with noise = step the sigmas are those of a displacement: divide by the step */
-    const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
-                               ? PLR_R(1) / (f->interval_s * f->interval_s)
+    const plr_real scale = source->noise == PLR_NOISE_STEP && source->interval_s > 0
+                               ? PLR_R(1) / (source->interval_s * source->interval_s)
                                : PLR_R(1);
-    bias_covariance(f, P_u);
+    bias_covariance(belief, motion, source, P_u);
     for (int i = 0; i < 3; i++) {
-        P_u[(PLR_POSE_DIM + 1) * i] += scale * f->par.velocity_variance[i];
-        P_u[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->par.gyro_variance[i];
+        P_u[(PLR_POSE_DIM + 1) * i] += scale * source->velocity_variance[i];
+        P_u[(PLR_POSE_DIM + 1) * (3 + i)] += scale * source->gyro_variance[i];
     }
 }
 
 /* xi = seconds (reading - b) */
-static void displacement(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+static void displacement(const plr_belief *belief, const plr_real reading[PLR_POSE_DIM],
                          plr_real seconds, plr_real xi[PLR_POSE_DIM]) {
     for (int i = 0; i < PLR_POSE_DIM; i++)
-        xi[i] = seconds * (reading[i] - f->bias[i]);
+        xi[i] = seconds * (reading[i] - belief->bias[i]);
 }
 
 static bool is_possible(const plr_real xi[PLR_POSE_DIM]) {
     return plr_step_is_possible(plr_dot3(xi, xi), plr_dot3(xi + 3, xi + 3));
 }
 
-static plr_status check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
-                        plr_real seconds) {
+static plr_status check(const plr_belief *belief, const plr_source *source,
+                        const plr_real reading[PLR_POSE_DIM], plr_real seconds) {
+    (void)source;
     plr_real xi[PLR_POSE_DIM];
-    displacement(f, reading, seconds, xi);
+    displacement(belief, reading, seconds, xi);
     return is_possible(xi) ? PLR_OK : PLR_E_RANGE;
 }
 
 /* Variances of a step's displacement, (rho, theta). */
-static void step_variance(const plr_filter *f, plr_real seconds, plr_real interval,
+static void step_variance(const plr_source *source, plr_real seconds, plr_real interval,
                           plr_real variance[PLR_POSE_DIM]) {
-    const plr_real share = f->config.noise == PLR_NOISE_STEP
+    const plr_real share = source->noise == PLR_NOISE_STEP
                                ? (interval > 0 ? seconds / interval : PLR_R(1))
                                : seconds * interval;
     for (int i = 0; i < 3; i++) {
-        variance[i] = f->par.velocity_variance[i] * share;
-        variance[3 + i] = f->par.gyro_variance[i] * share;
+        variance[i] = source->velocity_variance[i] * share;
+        variance[3 + i] = source->gyro_variance[i] * share;
     }
 }
 
 /* Whether readings were lost in an interval of h seconds. Where intervals differ by much all along,
  * a long one is usual: its reading stands for all of it, to the sigma that was told. */
-static bool lost_readings(const plr_filter *f, plr_real h) {
-    const plr_real usual = f->inertial.usual_s, late = h - usual;
+static bool lost_readings(const plr_source *source, plr_real h) {
+    const plr_real usual = source->inertial.usual_s, late = h - usual;
     return usual > 0 && h > PLR_LONG_INTERVALS * usual &&
-           late * late > LATE_SIGMAS * LATE_SIGMAS * f->inertial.off_usual2;
+           late * late > LATE_SIGMAS * LATE_SIGMAS * source->inertial.off_usual2;
 }
 
-static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_process_step *step) {
-    const bool makes_up = !lost_readings(f, plr_seconds(t_ns - f->reading_ns));
-    plr_mean_reading(f, f->config.twist_timing, makes_up, t_ns, reading, step);
+static void mean(const plr_belief *belief, const plr_source *source, plr_time_ns t_ns,
+                 const plr_real reading[PLR_READING_DIM], plr_process_step *step) {
+    const bool makes_up = !lost_readings(source, plr_seconds(t_ns - source->reading_ns));
+    plr_mean_reading(belief, source, source->timing, makes_up, t_ns, reading, step);
 }
 
-static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
-    (void)age;
-    memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
+static void hold(const plr_belief *belief, const plr_source *source, plr_real age,
+                 plr_real held[PLR_READING_DIM]) {
+    (void)belief, (void)age;
+    memcpy(held, source->reading, PLR_READING_DIM * sizeof *held);
 }
 
 /* The square of by how much a velocity is off that is held for n usual intervals: what readings
  * differ by beyond their noise, later what they scatter by. `which`: 0 linear, 1 angular. */
-static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
-    const plr_real *v = which == 0 ? f->par.velocity_variance : f->par.gyro_variance;
+static plr_real off2(const plr_source *source, unsigned which, plr_real n) {
+    PLR_ASSERT(which < 2 && n > PLR_R(0));
+    const plr_real *v = which == 0 ? source->velocity_variance : source->gyro_variance;
     const plr_real noise = (v[0] + v[1] + v[2]) / PLR_R(3);
-    const plr_real change = f->inertial.change2[which] - PLR_R(2) * noise;
-    const plr_real spread = f->inertial.spread2[which] - noise;
+    const plr_real change = source->inertial.change2[which] - PLR_R(2) * noise;
+    const plr_real spread = source->inertial.spread2[which] - noise;
     if (!(change > 0))
         return 0;
     const plr_real changed = PLR_R(0.25) * change * n * n;
@@ -119,16 +125,16 @@ static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
     return changed < most ? changed : most;
 }
 
-static PLR_SELDOM bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
-                              plr_real variance[PLR_POSE_DIM]) {
-    const plr_real usual = f->inertial.usual_s;
-    if (!lost_readings(f, h1) || f->config.noise == PLR_NOISE_STEP)
+static PLR_SELDOM bool missed(const plr_source *source, plr_real h0, plr_real h1,
+                              const plr_real *next, plr_real variance[PLR_POSE_DIM]) {
+    const plr_real usual = source->inertial.usual_s;
+    if (!lost_readings(source, h1) || source->noise == PLR_NOISE_STEP)
         return false;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        variance[i] = off2(f, i / 3, h1 / usual);
+        variance[i] = off2(source, i / 3, h1 / usual);
         if (next) { /* when it became what it is now is not known */
-            const plr_real *v = i < 3 ? f->par.velocity_variance : f->par.gyro_variance;
-            const plr_real step = next[i] - f->reading[i],
+            const plr_real *v = i < 3 ? source->velocity_variance : source->gyro_variance;
+            const plr_real step = next[i] - source->reading[i],
                            change = step * step - PLR_R(2) * v[i % 3];
             variance[i] += change > 0 ? change / PLR_R(3) : PLR_R(0);
         }
@@ -137,8 +143,10 @@ static PLR_SELDOM bool missed(const plr_filter *f, plr_real h0, plr_real h1, con
     return true;
 }
 
-static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
-    memcpy(reading, f->bias, PLR_READING_DIM * sizeof *reading);
+static void rest(const plr_belief *belief, const plr_source *source,
+                 plr_real reading[PLR_READING_DIM]) {
+    (void)source;
+    memcpy(reading, belief->bias, PLR_READING_DIM * sizeof *reading);
 }
 
 /* What the older reading had wrong in the part of the interval that it bridged counts by as much as the
@@ -152,42 +160,42 @@ static void make_up(const plr_process_step *by, const plr_real T[PLR_POSE_SQUARE
     }
 }
 
-static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
+static void step(plr_belief *belief, plr_motion *motion, plr_source *source, plr_time_ns t_ns,
+                 const plr_process_step *by) {
     const plr_real seconds = by->seconds;
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
         variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];
-    plr_motion *m = &f->motion;
-    bool fused = plr_velocity_is_held(f, t_ns);
-    displacement(f, fused ? by->whole : by->mean, seconds, xi);
-    step_variance(f, seconds, by->interval, variance);
+    bool fused = plr_velocity_is_held(belief, source, t_ns);
+    displacement(belief, fused ? by->whole : by->mean, seconds, xi);
+    step_variance(source, seconds, by->interval, variance);
     if (fused) {
         memset(V, 0, sizeof V);
         for (int i = 0; i < PLR_POSE_DIM; i++)
             V[(PLR_POSE_DIM + 1) * i] = variance[i];
-        plr_velocity_fuse(f, t_ns, seconds, xi, V, T);
+        plr_velocity_fuse(belief, source, t_ns, seconds, xi, V, T);
         make_up(by, T, xi);
         if (!is_possible(xi)) { /* no step of a robot: the velocities are wrong */
-            plr_velocity_forget(f);
-            displacement(f, by->mean, seconds, xi);
+            plr_velocity_forget(belief, source);
+            displacement(belief, by->mean, seconds, xi);
             fused = false;
         }
     }
     plr_se3_expm1(E, p, xi);
     plr_se3_rotation(R, E);
     plr_se3_adjoint_inverse(A, R, p);
-    f->t_ns = t_ns;
-    plr_pose_move(f, E, p);
-    plr_se3_append(m->E, m->p, E, p);
-    plr_so3_orthonormalise_small(m->E);
+    belief->t_ns = t_ns;
+    plr_pose_move(belief, E, p);
+    plr_se3_append(motion->E, motion->p, E, p);
+    plr_so3_orthonormalise_small(motion->E);
 
-    plr_sandwich6(next, A, m->Q);
+    plr_sandwich6(next, A, motion->Q);
     for (int i = 0; i < PLR_POSE_DIM && !fused; i++)
         next[(PLR_POSE_DIM + 1) * i] += variance[i];
     for (int i = 0; i < PLR_POSE_SQUARE && fused; i++)
         next[i] += V[i];
-    memcpy(m->Q, next, sizeof next);
+    memcpy(motion->Q, next, sizeof next);
 
-    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
+    if (plr_has_block(belief, PLR_BLOCK_BIAS)) {
         plr_real Jr[PLR_POSE_SQUARE];
         plr_se3_right_jacobian(Jr, xi);
         if (fused) {
@@ -195,16 +203,16 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_process_step *by) {
             memcpy(Jr, next, sizeof Jr);
         }
         plr_real AB[PLR_POSE_SQUARE] = {0};
-        plr_gemm_nn(PLR_POSE_DIM, PLR_BIAS_DIM, PLR_POSE_DIM, A, PLR_POSE_DIM, m->B, PLR_DRIVERS,
-                    AB, PLR_BIAS_DIM);
+        plr_gemm_nn(PLR_POSE_DIM, PLR_BIAS_DIM, PLR_POSE_DIM, A, PLR_POSE_DIM, motion->B,
+                    PLR_DRIVERS, AB, PLR_BIAS_DIM);
         for (int i = 0; i < PLR_POSE_DIM; i++)
             for (int j = 0; j < PLR_BIAS_DIM; j++)
-                m->B[PLR_DRIVERS * i + j] =
+                motion->B[PLR_DRIVERS * i + j] =
                     PLR_FMA(-seconds, Jr[PLR_BIAS_DIM * i + j], AB[PLR_BIAS_DIM * i + j]);
     }
-    m->seconds += seconds;
-    m->pending = 1;
-    m->noisy = 1;
+    motion->seconds += seconds;
+    motion->pending = 1;
+    motion->noisy = 1;
 }
 
 const plr_process plr_process_twist = {

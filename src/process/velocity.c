@@ -29,53 +29,56 @@ static plr_time_ns interval_of(const plr_held_velocity *held, plr_time_ns t_ns) 
     return interval <= LONGEST_INTERVAL_NS ? interval : 0;
 }
 
-void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows) {
+void plr_velocity_hold(const plr_belief *belief, plr_source *source, unsigned which,
+                       const plr_twist_rows *rows) {
     PLR_ASSERT(which < PLR_HELD_VELOCITIES);
-    if (!f->velocities_known)
-        plr_velocity_forget(f);
-    plr_held_velocity *held = &f->either.velocities.held[which];
-    const plr_time_ns before = held->interval_ns, interval = interval_of(held, f->t_ns);
+    if (!source->velocities_known)
+        plr_velocity_forget(belief, source);
+    plr_held_velocity *held = &source->either.velocities.held[which];
+    const plr_time_ns before = held->interval_ns, interval = interval_of(held, belief->t_ns);
     /* where a reading was lost or rejected, the interval of before */
     const plr_time_ns usual = before > 0 && before < interval ? before : interval;
     held->interval_ns = interval;
-    held->known = f->velocities_known = 1;
-    held->t_ns = f->t_ns;
-    held->until_ns = f->t_ns + HELD_INTERVALS * usual;
+    held->known = source->velocities_known = 1;
+    held->t_ns = belief->t_ns;
+    held->until_ns = belief->t_ns + HELD_INTERVALS * usual;
     memcpy(held->z, rows->z, sizeof held->z);
     memcpy(held->M, rows->M, sizeof held->M);
     for (unsigned r = 0; r < PLR_ROWS; r++)
         held->density[r] = rows->R[r] * plr_seconds(held->interval_ns);
 }
 
-void plr_velocity_forget(plr_filter *f) {
-    f->velocities_known = 0;
-    if (!plr_has_block(f, PLR_BLOCK_VELOCITY)) /* else nothing is held, and the place is taken */
-        memset(&f->either.velocities, 0, sizeof f->either.velocities);
+void plr_velocity_forget(const plr_belief *belief, plr_source *source) {
+    source->velocities_known = 0;
+    if (!plr_has_block(belief,
+                       PLR_BLOCK_VELOCITY)) /* else nothing is held, and the place is taken */
+        memset(&source->either.velocities, 0, sizeof source->either.velocities);
 }
 
-void plr_velocity_forget_bias(plr_filter *f) {
-    if (!f->velocities_known)
+void plr_velocity_forget_bias(plr_source *source) {
+    if (!source->velocities_known)
         return;
-    memset(f->either.velocities.bias_Lambda, 0, sizeof f->either.velocities.bias_Lambda);
-    memset(f->either.velocities.bias_eta, 0, sizeof f->either.velocities.bias_eta);
+    memset(source->either.velocities.bias_Lambda, 0, sizeof source->either.velocities.bias_Lambda);
+    memset(source->either.velocities.bias_eta, 0, sizeof source->either.velocities.bias_eta);
 }
 
 /* For a step from the filter's time to end_ns. */
-static bool holds(const plr_filter *f, const plr_held_velocity *held, plr_time_ns end_ns) {
-    return held->known && f->t_ns >= held->t_ns && end_ns <= held->until_ns;
+static bool holds(const plr_belief *belief, const plr_held_velocity *held, plr_time_ns end_ns) {
+    return held->known && belief->t_ns >= held->t_ns && end_ns <= held->until_ns;
 }
 
-bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns) {
-    for (unsigned i = 0; f->velocities_known && i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->either.velocities.held[i], end_ns))
+bool plr_velocity_is_held(const plr_belief *belief, const plr_source *source, plr_time_ns end_ns) {
+    for (unsigned i = 0; source->velocities_known && i < PLR_HELD_VELOCITIES; i++)
+        if (holds(belief, &source->either.velocities.held[i], end_ns))
             return true;
     return false;
 }
 
 /* Lambda += Y^T Y, eta += Y^T e for e = U^-T (s z - M xi) = Y db + N(0, I), Y = -s U^-T M T. */
-static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
+static void add_bias_information(plr_source *source, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
-    plr_real *eta = f->either.velocities.bias_eta, *Lambda = f->either.velocities.bias_Lambda;
+    plr_real *eta = source->either.velocities.bias_eta,
+             *Lambda = source->either.velocities.bias_Lambda;
     for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
             const plr_real *y = Y + PLR_POSE_DIM * r;
@@ -126,33 +129,33 @@ static void compare(const plr_held_velocity *held, plr_real seconds,
 }
 
 /* U of U^T U = S + Y P_b Y^T; Y NULL: of S alone. */
-static bool factorise(const plr_filter *f, const plr_real S[9],
+static bool factorise(const plr_belief *belief, const plr_real S[9],
                       const plr_real Y[PLR_ROWS * PLR_POSE_DIM], plr_real U[6]) {
     plr_real sum[9];
     memcpy(sum, S, sizeof sum);
     if (Y) {
         plr_real P_b[PLR_POSE_SQUARE], YP[PLR_ROWS * PLR_POSE_DIM];
-        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+        plr_covariance_get(belief, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
         plr_sandwich3(sum, YP, Y, P_b);
     }
     return plr_factorise3(U, sum);
 }
 
 /* Is the difference e more than noise and the biases' uncertainty explain? Y = -s M T. */
-static bool contradicts(const plr_filter *f, const plr_real S[9],
+static bool contradicts(const plr_belief *belief, const plr_source *source, const plr_real S[9],
                         const plr_real Y[PLR_ROWS * PLR_POSE_DIM], const plr_real e[PLR_ROWS]) {
     plr_real U[6], x[PLR_ROWS];
-    if (!factorise(f, S, plr_has_block(f, PLR_BLOCK_BIAS) ? Y : NULL, U))
+    if (!factorise(belief, S, plr_has_block(belief, PLR_BLOCK_BIAS) ? Y : NULL, U))
         return true;
     memcpy(x, e, sizeof x);
     plr_solve3_transposed(1, U, x);
     const plr_real d2 = plr_dot3(x, x);
-    return !plr_is_finite(d2) || (f->par.gate_d2 > 0 && d2 > CONTRADICTED * f->par.gate_d2);
+    return !plr_is_finite(d2) || (source->gate_d2 > 0 && d2 > CONTRADICTED * source->gate_d2);
 }
 
 /* Corrects a step by one held velocity: s z = M xi + noise of variance s density. */
-static void fuse_one(plr_filter *f, plr_held_velocity *held, plr_real seconds,
-                     plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
+static void fuse_one(const plr_belief *belief, plr_source *source, plr_held_velocity *held,
+                     plr_real seconds, plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
                      plr_real T[PLR_POSE_SQUARE]) {
     plr_real Kt[PLR_ROWS * PLR_POSE_DIM], Y[PLR_ROWS * PLR_POSE_DIM] = {0};
     plr_real S[9], U[6], e[PLR_ROWS], R[PLR_ROWS];
@@ -161,15 +164,15 @@ static void fuse_one(plr_filter *f, plr_held_velocity *held, plr_real seconds,
                 PLR_POSE_DIM);
     for (unsigned i = 0; i < PLR_ROWS * PLR_POSE_DIM; i++)
         Y[i] *= -seconds;
-    if (contradicts(f, S, Y, e) || !factorise(f, S, NULL, U)) {
+    if (contradicts(belief, source, S, Y, e) || !factorise(belief, S, NULL, U)) {
         held->until_ns = held->t_ns; /* until its next reading */
         return;
     }
     plr_solve3_transposed(PLR_POSE_DIM, U, Kt);
     plr_solve3_transposed(PLR_POSE_DIM, U, Y);
     plr_solve3_transposed(1, U, e);
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
-        add_bias_information(f, Y, e);
+    if (plr_has_block(belief, PLR_BLOCK_BIAS))
+        add_bias_information(source, Y, e);
     for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
         for (unsigned r = 0; r < PLR_ROWS; r++)
             xi[c] = PLR_FMA(Kt[PLR_POSE_DIM * r + c], e[r], xi[c]);
@@ -182,39 +185,40 @@ static void fuse_one(plr_filter *f, plr_held_velocity *held, plr_real seconds,
     correct(V, T, Kt, held, R);
 }
 
-void plr_velocity_fuse(plr_filter *f, plr_time_ns end_ns, plr_real seconds,
-                       plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
+void plr_velocity_fuse(const plr_belief *belief, plr_source *source, plr_time_ns end_ns,
+                       plr_real seconds, plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
                        plr_real T[PLR_POSE_SQUARE]) {
     memset(T, 0, PLR_POSE_SQUARE * sizeof *T);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         T[(PLR_POSE_DIM + 1) * i] = 1;
     for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->either.velocities.held[i], end_ns))
-            fuse_one(f, &f->either.velocities.held[i], seconds, xi, V, T);
+        if (holds(belief, &source->either.velocities.held[i], end_ns))
+            fuse_one(belief, source, &source->either.velocities.held[i], seconds, xi, V, T);
 }
 
 /* ---------------------------------------------------------------- the biases */
 
-bool plr_velocity_informs_bias(const plr_filter *f) {
-    for (unsigned i = 0; f->velocities_known && i < PLR_BIAS_DIM; i++)
-        if (f->either.velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
+bool plr_velocity_informs_bias(const plr_source *source) {
+    for (unsigned i = 0; source->velocities_known && i < PLR_BIAS_DIM; i++)
+        if (source->either.velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
             return true;
     return false;
 }
 
 /* With Lambda = L L^T: L^T db = L^-1 eta + N(0, I). */
-void plr_velocity_bias_rows(const plr_filter *f, unsigned part, plr_rows *H, plr_real r[PLR_ROWS]) {
+void plr_velocity_bias_rows(const plr_belief *belief, const plr_source *source, unsigned part,
+                            plr_rows *H, plr_real r[PLR_ROWS]) {
     plr_real L[PLR_POSE_SQUARE], y[PLR_BIAS_DIM];
-    plr_factor6(L, f->either.velocities.bias_Lambda);
+    plr_factor6(L, source->either.velocities.bias_Lambda);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
         const plr_real pivot = L[(PLR_BIAS_DIM + 1) * k];
-        y[k] = f->either.velocities.bias_eta[k];
+        y[k] = source->either.velocities.bias_eta[k];
         for (unsigned l = 0; l < k; l++)
             y[k] = PLR_FMA(-L[PLR_BIAS_DIM * k + l], y[l], y[k]);
         y[k] = pivot > 0 ? y[k] / pivot : PLR_R(0);
     }
     H->terms = 0;
-    plr_real *by_bias = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
+    plr_real *by_bias = plr_rows_add(H, plr_row_of(belief, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const unsigned k = PLR_ROWS * part + i;
         r[i] = y[k];

@@ -9,7 +9,6 @@
 #ifndef PLR_SENSOR_MEASUREMENT_H
 #define PLR_SENSOR_MEASUREMENT_H
 
-#include "pelorus/state.h"
 #include "state/rows.h"
 
 typedef struct plr_measurement {
@@ -28,12 +27,5 @@ typedef struct plr_measurement {
      * linearisation would be wrong there. 0: no limit. */
     plr_real max_variance;
 } plr_measurement;
-
-/* Keeps H, r and R of the measurement of a slot's landmark until the correction: rows by the
- * landmark and maybe the pose. In one frame all have the same R. */
-void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m);
-
-/* The measurement that was kept. What the gate alone needs is zero. */
-void plr_measurement_recall(const plr_filter *f, unsigned slot, plr_measurement *m);
 
 #endif

@@ -6,17 +6,18 @@
 #ifndef PLR_SENSOR_SENSOR_H
 #define PLR_SENSOR_SENSOR_H
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/types.h"
 #include "sensor/measurement.h"
 
 /* A kind of sensor: one of the two functions, the other is NULL. The reading has been checked:
  * finite numbers, and a sigma above zero for each number that was measured. */
 typedef struct plr_sensor_kind {
     /* For a sensor of the state: fills the rows at the present estimate. */
-    void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
+    void (*of_state)(const plr_belief *belief, const plr_reading *reading, plr_measurement *m);
 
     /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how
-     * many times. They are held in f->either.velocities.held[place] and after it. */
+     * many times. They are held in plr_velocities.held[place] and after it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 
@@ -35,11 +36,6 @@ const plr_sensor_kind *plr_sensor_of(unsigned sensor);
 static inline bool plr_reading_has(const plr_reading *reading, unsigned i) {
     return (reading->axes >> i & 1U) != 0;
 }
-
-/* Looks for a standstill in a frame of n observations (work.order, work.slot_of): true, with the
- * reading, if for a second no pixel moved by more than its noise. */
-bool plr_standstill_is_seen(plr_filter *f, const plr_frame *frame, unsigned n,
-                            plr_reading *reading);
 
 #define SENSOR(number, kind, about) extern const plr_sensor_kind kind;
 #include "sensor/sensors.def"

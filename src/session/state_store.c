@@ -242,7 +242,7 @@ static plr_status write_slot(plr_state_store *store, unsigned slot, uint64_t gen
     const uint32_t start = slot_start(store, slot), state = start + header_space(store);
     plr_store_writer writer = {.store = store, .at = state, .room = PLR_STORE_BUFFER / unit * unit};
     uint32_t crc;
-    if (!erase_blocks(store, start, occupied(store, plr_filter_saved_size(f, f->count))))
+    if (!erase_blocks(store, start, occupied(store, plr_filter_saved_size(f, f->belief.count))))
         return PLR_E_IO;
     const plr_status status = plr_filter_save(f, append_state, &writer);
     if (status != PLR_OK)

@@ -5,12 +5,13 @@
 #include "math/blocks3.h"
 #include "math/dense.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "state/elements.h"
 
-PLR_SELDOM void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9]) {
+PLR_SELDOM void plr_covariance_of_rows(const plr_belief *belief, const plr_rows *H, plr_real S[9]) {
     if (H->terms == 1 && plr_rows_begin_with_three(H)) {
         plr_real P[9], HP[9];
-        plr_get_block(f, H->term[0].row, 3, H->term[0].row, 3, P);
+        plr_get_block(belief, H->term[0].row, 3, H->term[0].row, 3, P);
         plr_mat3_mul(HP, H->term[0].H, P);
         plr_mat3_mul_nt(S, HP, H->term[0].H);
         return;
@@ -22,7 +23,7 @@ PLR_SELDOM void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, p
         for (unsigned a = H->terms; a-- > 0;) {
             const plr_term *left = &H->term[a];
             plr_real P[PLR_WIDEST_BLOCK * PLR_WIDEST_BLOCK];
-            plr_get_block(f, left->row, left->columns, right->row, right->columns, P);
+            plr_get_block(belief, left->row, left->columns, right->row, right->columns, P);
             plr_gemm_nn(PLR_ROWS, right->columns, left->columns, left->H, left->columns, P,
                         right->columns, HP, right->columns);
         }
@@ -31,12 +32,13 @@ PLR_SELDOM void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, p
     }
 }
 
-PLR_SELDOM void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H,
-                                              plr_real S[9]) {
-    const unsigned ld = plr_covariance_ld(f);
+PLR_SELDOM void plr_covariance_add_open_noise(const plr_belief *belief, const plr_noise *noise,
+                                              const plr_rows *H, plr_real S[9]) {
+    PLR_ASSERT(noise->open);
+    const unsigned ld = plr_covariance_ld(belief);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real a[3];
-        plr_rows_apply(H, f->work.noise.Wt + k * ld, a);
+        plr_rows_apply(H, noise->Wt + k * ld, a);
         for (unsigned i = 0; i < 3; i++)
             for (unsigned j = 0; j < 3; j++)
                 S[3 * i + j] = PLR_FMA(a[i], a[j], S[3 * i + j]);
@@ -59,23 +61,24 @@ static inline void project_columns(unsigned first, unsigned n, const plr_real H[
 }
 
 /* rows[r][i] = sum_c H[r][c] P(i, s + c): one pass over P, three columns at a time. */
-static void project_landmark(const plr_filter *f, unsigned n, unsigned s, const plr_real H[9],
+static void project_landmark(const plr_belief *belief, unsigned n, unsigned s, const plr_real H[9],
                              plr_real *rows, size_t ld) {
-    const plr_real *P = f->P;
+    const plr_real *P = belief->P;
     plr_real *out0 = rows, *out1 = rows + ld, *out2 = rows + 2 * ld;
     plr_real own[9];
     plr_rows3_from_left(s, H, P + plr_packed_row(s), P + plr_packed_row(s + 1),
                         P + plr_packed_row(s + 2), out0, out1, out2);
-    plr_get_block(f, s, 3, s, 3, own);
+    plr_get_block(belief, s, 3, s, 3, own);
     plr_rows3_from_left(3, H, own, own + 3, own + 6, out0 + s, out1 + s, out2 + s);
     project_columns(s + 3, n, H, P, s, out0, out1, out2);
 }
 
-void plr_covariance_project(const plr_filter *f, const plr_rows *H, plr_real *rows, size_t ld) {
-    const unsigned n = plr_covariance_dim(f);
+void plr_covariance_project(const plr_belief *belief, const plr_rows *H, plr_real *rows,
+                            size_t ld) {
+    const unsigned n = plr_covariance_dim(belief);
     unsigned t = 0, filled = 0;
     if (plr_rows_begin_with_three(H)) {
-        project_landmark(f, n, H->term[0].row, H->term[0].H, rows, ld);
+        project_landmark(belief, n, H->term[0].row, H->term[0].H, rows, ld);
         filled = n;
         t = 1;
     }
@@ -85,34 +88,36 @@ void plr_covariance_project(const plr_filter *f, const plr_rows *H, plr_real *ro
         const plr_term *term = &H->term[t];
         for (unsigned r = 0; r < PLR_ROWS; r++)
             for (unsigned c = 0; c < term->columns; c++)
-                plr_add_column(f, n, term->row + c, term->H[r * term->columns + c], rows + r * ld);
+                plr_add_column(belief, n, term->row + c, term->H[r * term->columns + c],
+                               rows + r * ld);
     }
 }
 
-bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
-    const unsigned n = plr_covariance_dim(f), ld = plr_covariance_ld(f);
+bool plr_covariance_subtract(plr_belief *belief, const plr_real *Vt, unsigned depth) {
+    const unsigned n = plr_covariance_dim(belief), ld = plr_covariance_ld(belief);
     plr_real after[PLR_TILE_COLUMNS];
     for (unsigned i = 0; i < n;) {
         const unsigned end =
-            i + plr_packed_subtracted_diagonal(i, n, depth, f->work.Vt, ld, f->P, after);
+            i + plr_packed_subtracted_diagonal(i, n, depth, Vt, ld, belief->P, after);
         for (const plr_real *variance = after; i < end; i++, variance++) {
-            const plr_real before = f->P[plr_packed_row(i) + i];
+            const plr_real before = belief->P[plr_packed_row(i) + i];
             const bool stays_zero = before <= 0 && before >= 0 && *variance <= 0 && *variance >= 0;
             if (!(*variance > 0) && !stays_zero)
                 return false;
         }
     }
-    plr_packed_subtract(n, depth, f->work.Vt, f->work.Vt, ld, f->P);
+    plr_packed_subtract(n, depth, Vt, Vt, ld, belief->P);
     return true;
 }
 
-void plr_covariance_make_up_for_rounding(plr_filter *f) {
+void plr_covariance_make_up_for_rounding(plr_belief *belief) {
     const plr_real seen = PLR_R(8) * PLR_EPSILON, unseen = PLR_EPSILON;
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const unsigned row = plr_covariance_row(f, slot);
-        const plr_real share = f->slots[slot].last_frame == f->frame_number ? seen : unseen;
+    for (unsigned slot = 0; slot < belief->count; slot++) {
+        const unsigned row = plr_covariance_row(belief, slot);
+        const plr_real share =
+            belief->slots[slot].last_frame == belief->frame_number ? seen : unseen;
         for (unsigned i = row; i < row + 3; i++) {
-            plr_real *variance = &f->P[plr_packed_row(i) + i];
+            plr_real *variance = &belief->P[plr_packed_row(i) + i];
             *variance = PLR_FMA(share, *variance, *variance);
         }
     }

@@ -8,7 +8,10 @@
 
 #include <stdbool.h>
 
-#include "pelorus/state.h"
+#include "pelorus/belief.h"
+#include "pelorus/camera.h"
+#include "pelorus/settings.h"
+#include "pelorus/workspace.h"
 #include "state/motion.h"
 #include "state/rows.h"
 
@@ -38,44 +41,50 @@ typedef struct plr_world_point {
 struct plr_model {
     /* Applies a motion to landmarks and covariance; T_WB has been moved before. `body` keeps the
      * motion's noise apart in work.noise (docs/MATH.md 10); `world` adds it to P. */
-    void (*propagate)(plr_filter *f, const plr_applied_motion *motion);
+    void (*propagate)(plr_belief *belief, const plr_camera_model *camera, const plr_motion *motion,
+                      plr_workspace *work, const plr_applied_motion *applied);
 
     /* The landmark in the camera. False nearer than min_depth, where no linearisation is valid. */
-    bool (*look)(const plr_filter *f, unsigned slot, plr_view *view);
+    bool (*look)(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
+                 plr_view *view);
 
     /* From derivatives by the point in the camera to those by the state's error: H = Dz dq/dx, Dz
      * 3x3. Dz q = along / q_z is passed besides: from Dz it would be a difference of rounded
      * numbers. z, the prediction, is corrected for plr_slot.beyond. */
-    void (*derive)(const plr_filter *f, unsigned slot, const plr_view *view, const plr_real Dz[9],
-                   const plr_real along[3], plr_real z[3], plr_rows *H);
+    void (*derive)(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
+                   const plr_view *view, const plr_real Dz[9], const plr_real along[3],
+                   plr_real z[3], plr_rows *H);
 
     /* Makes a landmark from a point q in the camera, m, with covariance S_q S_q^T (3x3). The factor
      * S_q is passed and not the product: for a far point the variance along the ray is so large
      * that rounding would destroy the variance across it. The caller fills by_calibration. */
-    void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
-                       plr_new_landmark *landmark);
+    void (*initialise)(const plr_belief *belief, const plr_camera_model *camera,
+                       const plr_real q[3], const plr_real S_q[9], plr_new_landmark *landmark);
 
     /* Makes a landmark of a known position in the world. False if the model cannot. */
-    bool (*adopt)(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark);
+    bool (*adopt)(const plr_belief *belief, const plr_camera_model *camera,
+                  const plr_motion *motion, const plr_landmark *known, plr_new_landmark *landmark);
 
     /* The tracks have wandered off their points by sigma px in u and in v. Both pictures show the
      * same patch, so the point stays as deep as it is. NULL in `world`. */
-    void (*drift)(plr_filter *f, plr_real sigma);
+    void (*drift)(plr_belief *belief, const plr_camera_model *camera, plr_real sigma);
 
     /* Applies a correction dx of the whole state to the landmarks, and transports P there; pose and
      * bias are the caller's. Returns how many were limited: PLR_REASON_RANGE_LIMITED. */
-    unsigned (*retract)(plr_filter *f, const plr_real *dx);
+    unsigned (*retract)(plr_belief *belief, const plr_camera_model *camera, plr_workspace *work,
+                        const plr_real *dx);
 
     /* The position of a landmark in the world. */
-    void (*in_world)(const plr_filter *f, const plr_slot *slot, plr_world_point *point);
+    void (*in_world)(const plr_belief *belief, const plr_camera_model *camera,
+                     const plr_motion *motion, const plr_slot *slot, plr_world_point *point);
 };
 
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;
 
 /* The model is stored as a number: a damaged address would be followed before any checksum. */
-static inline const struct plr_model *plr_model_of(const plr_filter *f) {
-    return f->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
+static inline const struct plr_model *plr_model_of(const plr_belief *belief) {
+    return belief->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
 }
 
 #endif

@@ -5,6 +5,7 @@
  * filter is invariant: directions that nothing observes (the pose of the world) stay unobserved, so
  * that it gains no information about them from linearisation. docs/MATH.md 2 and 6.
  */
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
@@ -38,7 +39,7 @@ static inline void times_adjoint(plr_real row[PLR_POSE_DIM], const plr_real way[
 
 /* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: the derivative of a landmark's chart by the body's twist.
  * Jw [-I | [q]x] = [ -N^T / r | N^T [mu]x ; mu^T / r^2 | 0 ]. */
-static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
+static void chart_by_body_twist(const plr_camera_model *camera, const plr_polar *chart,
                                 plr_real J[PLR_ROWS * PLR_POSE_DIM]) {
     const plr_real inverse = PLR_R(1) / chart->r;
     plr_real way[3];
@@ -48,11 +49,11 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
         plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
         for (int j = 0; j < 3; j++)
             way[j] = -n[j] * inverse;
-        times_adjoint(J + PLR_POSE_DIM * row, way, turn, f->par.Ad_CB);
+        times_adjoint(J + PLR_POSE_DIM * row, way, turn, camera->Ad_CB);
     }
     for (int j = 0; j < 3; j++)
         way[j] = chart->mu[j] * inverse * inverse;
-    times_adjoint(J + 2 * PLR_POSE_DIM, way, NULL, f->par.Ad_CB);
+    times_adjoint(J + 2 * PLR_POSE_DIM, way, NULL, camera->Ad_CB);
 }
 
 /* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): the derivative of the chart at q+ by the chart
@@ -88,8 +89,9 @@ static void enforce_min_range(plr_real q[3]) {
 }
 
 /* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
-static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *Wt, size_t ld) {
-    const unsigned n = plr_covariance_dim(f), first = plr_covariance_row(f, 0);
+static void fill_W(const plr_belief *belief, const plr_camera_model *camera,
+                   const plr_real JL[PLR_POSE_SQUARE], plr_real *Wt, size_t ld) {
+    const unsigned n = plr_covariance_dim(belief), first = plr_covariance_row(belief, 0);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
             Wt[k * ld + i] = JL[PLR_POSE_DIM * i + k];
@@ -97,12 +99,12 @@ static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *
                (first - PLR_POSE_DIM) * sizeof *Wt); /* a motion changes no bias */
         memset(Wt + k * ld + n, 0, (ld - n) * sizeof *Wt);
     }
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const unsigned row = plr_covariance_row(f, slot);
+    for (unsigned slot = 0; slot < belief->count; slot++) {
+        const unsigned row = plr_covariance_row(belief, slot);
         plr_polar chart;
         plr_real G[PLR_ROWS * PLR_POSE_DIM], GL[PLR_ROWS * PLR_POSE_DIM] = {0};
-        plr_polar_at(&chart, f->slots[slot].x);
-        chart_by_body_twist(f, &chart, G);
+        plr_polar_at(&chart, belief->slots[slot].x);
+        chart_by_body_twist(camera, &chart, G);
         plr_gemm_nn(3, PLR_POSE_DIM, PLR_POSE_DIM, G, PLR_POSE_DIM, JL, PLR_POSE_DIM, GL,
                     PLR_POSE_DIM);
         for (unsigned i = 0; i < 3; i++)
@@ -113,37 +115,44 @@ static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *
 
 /* Moves a landmark along its ray to its linearisation point (filter/linearisation.h). The estimate does
  * not change: returns the estimated inverse range minus that of the point, 1/m. */
-static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
-    plr_slot *s = &f->slots[slot];
+static plr_real move_to_linearisation_point(plr_belief *belief, const plr_camera_model *camera,
+                                            const plr_noise *noise, unsigned slot) {
+    PLR_ASSERT(slot < belief->count);
+    plr_slot *s = &belief->slots[slot];
     const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
-    const plr_real wanted = s->beyond + f->work.noise.range_shift[slot];
+    const plr_real wanted = s->beyond + noise->range_shift[slot];
     plr_real ratio = PLR_FMA(wanted, range, PLR_R(1)); /* of inverse ranges */
-    const plr_real farthest = f->par.min_inverse_range * range;
+    const plr_real farthest = camera->min_inverse_range * range;
     ratio = ratio < farthest ? farthest : ratio > nearest ? nearest : ratio;
     const plr_real step = (PLR_R(1) - ratio) / ratio;
     for (int i = 0; i < 3; i++)
         s->x[i] = PLR_FMA(step, s->x[i], s->x[i]);
-    plr_sensitivity_move_range(f, slot, ratio);
+    plr_sensitivity_move_range(belief, camera, slot, ratio);
     return s->beyond - (ratio - PLR_R(1)) / range;
 }
 
-static bool body_look(const plr_filter *f, unsigned slot, plr_view *view) {
-    memcpy(view->q, f->slots[slot].x, sizeof view->q);
-    return view->q[2] >= f->par.min_depth;
+static bool body_look(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
+                      plr_view *view) {
+    PLR_ASSERT(slot < belief->count);
+    memcpy(view->q, belief->slots[slot].x, sizeof view->q);
+    return view->q[2] >= camera->min_depth;
 }
 
 /* H = Dz Ji(q), Ji = [r N | -r q]. */
-static void body_derive(const plr_filter *f, unsigned slot, const plr_view *view,
-                        const plr_real Dz[9], const plr_real along[3], plr_real z[3], plr_rows *H) {
+static void body_derive(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
+                        const plr_view *view, const plr_real Dz[9], const plr_real along[3],
+                        plr_real z[3], plr_rows *H) {
+    PLR_ASSERT(slot < belief->count);
+    (void)camera;
     plr_polar chart;
     plr_polar_at(&chart, view->q);
     H->terms = 0;
-    plr_real *h = plr_rows_add(H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
+    plr_real *h = plr_rows_add(H, plr_covariance_row(belief, slot), PLR_LANDMARK_DIM);
     for (int row = 0; row < 3; row++, h += 3) {
         for (int column = 0; column < 2; column++)
             h[column] = chart.r * plr_dot3(Dz + 3 * row, chart.N[column]);
         h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
-        z[row] = PLR_FMA(h[2], f->slots[slot].beyond, z[row]);
+        z[row] = PLR_FMA(h[2], belief->slots[slot].beyond, z[row]);
     }
 }
 
@@ -158,9 +167,10 @@ static void point_to_chart(const plr_real q[3], const plr_real S_q[9], plr_real 
     plr_mat3_mul_nt(P, JS, JS);
 }
 
-static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
+static void body_initialise(const plr_belief *belief, const plr_camera_model *camera,
+                            const plr_real q[3], const plr_real S_q[9],
                             plr_new_landmark *landmark) {
-    (void)f;
+    (void)belief, (void)camera;
     point_to_chart(q, S_q, landmark->J_q, landmark->P);
     memcpy(landmark->x, q, 3 * sizeof *q);
     landmark->uses_pose = false;
@@ -186,28 +196,29 @@ static bool covariance_in_chart(plr_real P[9], const plr_real J[9], const double
     return P[0] >= 0 && P[4] >= 0 && P[8] >= 0;
 }
 
-static PLR_SELDOM bool body_adopt(const plr_filter *f, const plr_landmark *known,
+static PLR_SELDOM bool body_adopt(const plr_belief *belief, const plr_camera_model *camera,
+                                  const plr_motion *motion, const plr_landmark *known,
                                   plr_new_landmark *landmark) {
     plr_real offset_W[3], s_B[3], R_CW[9], R_WB[9];
     double p_WB[3];
-    plr_pose_reference(f, R_WB, p_WB);
+    plr_pose_reference(belief, motion, R_WB, p_WB);
     for (int i = 0; i < 3; i++)
         offset_W[i] = (plr_real)(known->p_W_m[i] - p_WB[i]);
     plr_mat3_tvec(s_B, R_WB, offset_W);
-    plr_camera_from_body(landmark->x, &f->par.camera, s_B);
+    plr_camera_from_body(landmark->x, &camera->given, s_B);
     const plr_real range2 = plr_dot3(landmark->x, landmark->x);
     if (!(range2 > PLR_MIN_RANGE * PLR_MIN_RANGE) ||
-        !(range2 * f->par.min_inverse_range * f->par.min_inverse_range < 1))
+        !(range2 * camera->min_inverse_range * camera->min_inverse_range < 1))
         return false;
 
     plr_polar chart;
     plr_real Jw[9], J_W[9];
     plr_polar_at(&chart, landmark->x);
-    chart_by_body_twist(f, &chart, landmark->J_pose);
+    chart_by_body_twist(camera, &chart, landmark->J_pose);
     landmark->uses_pose = true;
     memset(landmark->by_calibration, 0, sizeof landmark->by_calibration);
     plr_polar_from_point(Jw, &chart);
-    plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, R_WB);
+    plr_mat3_mul_nt(R_CW, camera->given.R_CB, R_WB);
     plr_mat3_mul(J_W, Jw, R_CW);
     return covariance_in_chart(landmark->P, J_W, known->P_W_m2);
 }
@@ -222,9 +233,10 @@ typedef struct plr_common_motion {
  * a dark stretch corrects position and old landmarks by metres, but not those that it sees. */
 enum { IN_SIGHT, OUT_OF_SIGHT, SIGHTS };
 
-static unsigned sight_of(const plr_filter *f, unsigned slot) {
-    const bool parted = plr_has_block(f, PLR_BLOCK_VELOCITY);
-    return parted && f->slots[slot].last_frame != f->frame_number ? OUT_OF_SIGHT : IN_SIGHT;
+static unsigned sight_of(const plr_belief *belief, unsigned slot) {
+    const bool parted = plr_has_block(belief, PLR_BLOCK_VELOCITY);
+    return parted && belief->slots[slot].last_frame != belief->frame_number ? OUT_OF_SIGHT
+                                                                            : IN_SIGHT;
 }
 
 /* The rigid motions eta of the body that the landmarks' corrections have in common. They differ
@@ -232,28 +244,30 @@ static unsigned sight_of(const plr_filter *f, unsigned slot) {
  * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
  * causes. Known landmarks are left out: they are fixed in the world, and the common part of a map's
  * errors is no motion. J becomes chart_by_body_twist of every slot. */
-static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_real *J,
+static void find_common_motions(const plr_belief *belief, const plr_camera_model *camera,
+                                const plr_noise *noise, const plr_real *dx, plr_real *J,
                                 plr_common_motion common[SIGHTS]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
-    const bool parted = plr_has_block(f, PLR_BLOCK_VELOCITY);
-    const plr_real baseline = f->par.camera.baseline;
+    const bool parted = plr_has_block(belief, PLR_BLOCK_VELOCITY);
+    const plr_real baseline = camera->given.baseline;
     const plr_real W[3] = {1, 1, baseline * baseline};
-    const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
+    const plr_real angle2 = camera->pixel_variance / (camera->given.fx * camera->given.fx);
     plr_rigid_fit fit[SIGHTS];
     memset(fit, 0, sizeof fit);
-    for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
+    for (unsigned slot = 0; slot < belief->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         plr_polar chart;
-        plr_polar_at(&chart, f->slots[slot].x);
-        chart_by_body_twist(f, &chart, J);
-        if (!f->slots[slot].known)
-            plr_rigid_fit_add(&fit[sight_of(f, slot)], J, dx + plr_covariance_row(f, slot), W);
+        plr_polar_at(&chart, belief->slots[slot].x);
+        chart_by_body_twist(camera, &chart, J);
+        if (!belief->slots[slot].known)
+            plr_rigid_fit_add(&fit[sight_of(belief, slot)], J,
+                              dx + plr_covariance_row(belief, slot), W);
     }
     for (unsigned sight = 0; sight < (parted ? SIGHTS : 1); sight++) {
         plr_common_motion *m = &common[sight];
         plr_real eta_C[PLR_POSE_DIM];
         plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : dx,
-                            f->work.noise.motion_variance, angle2, m->eta);
-        plr_mat6_vec(eta_C, f->par.Ad_CB, m->eta);
+                            noise->motion_variance, angle2, m->eta);
+        plr_mat6_vec(eta_C, camera->Ad_CB, m->eta);
         plr_se3_expm1(m->E, m->p, eta_C);
         plr_se3_rotation(m->R, m->E);
     }
@@ -275,22 +289,23 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
  * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q), where theta_C is the rotation of
  * eta_C, and the pose's rows by Ad(Exp(-xi)).
  */
-static unsigned body_retract(plr_filter *f, const plr_real *dx) {
+static unsigned body_retract(plr_belief *belief, const plr_camera_model *camera,
+                             plr_workspace *work, const plr_real *dx) {
     plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE];
     plr_common_motion both[SIGHTS];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
-    plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot; Vt has at least 72 */
-    find_common_motions(f, dx, J, both);
+    plr_real *F = work->Vt, *J = F + 9 * belief->count; /* 27 numbers a slot; Vt has at least 72 */
+    find_common_motions(belief, camera, &work->noise, dx, J, both);
 
     unsigned cut = 0;
-    for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
-        const plr_common_motion *common = &both[sight_of(f, slot)];
-        plr_slot *s = &f->slots[slot];
+    for (unsigned slot = 0; slot < belief->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
+        const plr_common_motion *common = &both[sight_of(belief, slot)];
+        plr_slot *s = &belief->slots[slot];
         plr_polar from, there, to;
         plr_real M[4], w[3], rigid[9];
         plr_polar_at(&from, s->x);
-        memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
+        memcpy(w, dx + plr_covariance_row(belief, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < PLR_POSE_DIM; k++)
                 w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], common->eta[k], w[i]);
@@ -299,8 +314,8 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         plr_polar_at(&there, s->x);
         chart_jacobian(rigid, &there, common->R, common->p, &from);
         turn_rest(w, rigid, &there, &from);
-        cut += plr_polar_retract(&to, M, &there, w, f->par.min_inverse_range, s->x, &s->beyond);
-        plr_sensitivity_move_range(f, slot, there.r / to.r);
+        cut += plr_polar_retract(&to, M, &there, w, camera->min_inverse_range, s->x, &s->beyond);
+        plr_sensitivity_move_range(belief, camera, slot, there.r / to.r);
         plr_real *own = F + 9 * slot;
         for (int k = 0; k < 3; k++) {
             own[k] = PLR_FMA(M[1], rigid[3 + k], M[0] * rigid[k]);
@@ -308,28 +323,30 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
             own[6 + k] = rigid[6 + k];
         }
     }
-    plr_covariance_transport(f, A, F);
+    plr_covariance_transport(belief, work->Vt, A, F);
     return cut;
 }
 
-static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
+static void body_propagate(plr_belief *belief, const plr_camera_model *camera,
+                           const plr_motion *motion, plr_workspace *work,
+                           const plr_applied_motion *applied) {
     plr_real E[9], R[9], p[3];
-    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
+    plr_camera_motion(E, p, &camera->given, applied->E, applied->p);
     plr_se3_rotation(R, E);
 
-    plr_real *F = f->work.Vt, largest_offset = 0;
-    memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        plr_slot *s = &f->slots[slot];
+    plr_real *F = work->Vt, largest_offset = 0;
+    memset(work->dx, 0, plr_covariance_row(belief, 0) * sizeof *work->dx);
+    for (unsigned slot = 0; slot < belief->count; slot++) {
+        plr_slot *s = &belief->slots[slot];
         plr_polar from, to;
-        const plr_real offset = move_to_linearisation_point(f, slot);
+        const plr_real offset = move_to_linearisation_point(belief, camera, &work->noise, slot);
         largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
         plr_polar_at(&from, s->x);
         plr_se3_move_back(s->x, E, p);
         enforce_min_range(s->x);
         plr_polar_at(&to, s->x);
         chart_jacobian(F + 9 * slot, &to, R, p, &from);
-        plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
+        plr_real *dx = work->dx + plr_covariance_row(belief, slot);
         dx[0] = offset * F[9 * slot + 2];
         dx[1] = offset * F[9 * slot + 5];
         dx[2] = 0;
@@ -337,51 +354,53 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     }
     plr_real A[PLR_POSE_SQUARE];
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* the prior of the common motions */
-        f->work.noise.motion_variance[k] = plr_norm2_of_6(motion->JL + PLR_POSE_DIM * k);
-    plr_se3_rotation(R, motion->E);
-    plr_se3_adjoint_inverse(A, R, motion->p);
-    plr_covariance_transport(f, A, F);
-    if (!f->motion.noisy) { /* no correction follows to which dx could be added */
+        work->noise.motion_variance[k] = plr_norm2_of_6(applied->JL + PLR_POSE_DIM * k);
+    plr_se3_rotation(R, applied->E);
+    plr_se3_adjoint_inverse(A, R, applied->p);
+    plr_covariance_transport(belief, work->Vt, A, F);
+    if (!motion->noisy) { /* no correction follows to which dx could be added */
         if (largest_offset > 0)
-            (void)body_retract(f, f->work.dx);
+            (void)body_retract(belief, camera, work, work->dx);
         return;
     }
-    fill_W(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
-    plr_covariance_open_noise(f, motion);
+    fill_W(belief, camera, applied->JL, work->noise.Wt, plr_covariance_ld(belief));
+    plr_covariance_open_noise(belief, motion, work, applied);
 }
 
-static PLR_SELDOM void body_drift(plr_filter *f, plr_real sigma) {
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const plr_real *q = f->slots[slot].x, wanders = sigma * q[2];
+static PLR_SELDOM void body_drift(plr_belief *belief, const plr_camera_model *camera,
+                                  plr_real sigma) {
+    for (unsigned slot = 0; slot < belief->count; slot++) {
+        const plr_real *q = belief->slots[slot].x, wanders = sigma * q[2];
         const plr_real S_q[9] = {
-            [0] = wanders / f->par.camera.fx, [4] = wanders / f->par.camera.fy};
+            [0] = wanders / camera->given.fx, [4] = wanders / camera->given.fy};
         plr_real J_q[9], C[9];
-        if (f->slots[slot].known)
+        if (belief->slots[slot].known)
             continue;
         point_to_chart(q, S_q, J_q, C);
-        plr_covariance_add_to_landmark(f, slot, C);
+        plr_covariance_add_to_landmark(belief, slot, C);
     }
 }
 
-static PLR_SELDOM void body_in_world(const plr_filter *f, const plr_slot *slot,
+static PLR_SELDOM void body_in_world(const plr_belief *belief, const plr_camera_model *camera,
+                                     const plr_motion *motion, const plr_slot *slot,
                                      plr_world_point *point) {
     plr_polar chart;
     plr_real s_B[3], offset[3], Ji[9], R_WC[9], R_WB[9];
     double p_WB[3];
-    plr_pose_reference(f, R_WB, p_WB);
-    plr_camera_to_body(s_B, &f->par.camera, slot->x);
+    plr_pose_reference(belief, motion, R_WB, p_WB);
+    plr_camera_to_body(s_B, &camera->given, slot->x);
     plr_mat3_vec(offset, R_WB, s_B);
     for (int i = 0; i < 3; i++)
         point->p_W[i] = p_WB[i] + (double)offset[i];
 
-    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    const unsigned row = plr_covariance_row(belief, (unsigned)(slot - belief->slots));
     point->J.terms = 0;
     plr_real *own = plr_rows_add(&point->J, row, PLR_LANDMARK_DIM);
     plr_world_by_pose(R_WB, s_B,
-                      plr_rows_add(&point->J, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM));
+                      plr_rows_add(&point->J, plr_row_of(belief, PLR_BLOCK_POSE), PLR_POSE_DIM));
     plr_polar_at(&chart, slot->x);
     plr_polar_to_point(Ji, &chart);
-    plr_mat3_mul_nt(R_WC, R_WB, f->par.camera.R_CB);
+    plr_mat3_mul_nt(R_WC, R_WB, camera->given.R_CB);
     plr_mat3_mul(own, R_WC, Ji);
 }
 

@@ -3,6 +3,7 @@
 
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 
 /* N(mu) for a unit vector mu. */
 static void basis(plr_real N[2][3], const plr_real mu[3]) {
@@ -59,6 +60,7 @@ static void bearing_transport(plr_real M[4], const plr_polar *to, const plr_real
 bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
                        const plr_real w[3], plr_real min_inverse_range, plr_real q[3],
                        plr_real *beyond) {
+    PLR_ASSERT(min_inverse_range >= PLR_R(0));
     bool cut = false;
     plr_real w1 = w[0], w2 = w[1];
     const plr_real turn2 = PLR_FMA(w2, w2, w1 * w1);

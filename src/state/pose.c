@@ -4,18 +4,19 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "pelorus/assertions.h"
 #include "state/rigid_fit.h"
 
 /* Not made orthonormal, R would deviate from a rotation by 0.01 in an hour of float32 steps. */
-void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
+void plr_pose_move(plr_belief *belief, const plr_real E[9], const plr_real d[3]) {
     plr_real step[3], change[9];
-    plr_mat3_vec(step, f->R_WB, d);
-    plr_mat3_mul(change, f->R_WB, E);
+    plr_mat3_vec(step, belief->R_WB, d);
+    plr_mat3_mul(change, belief->R_WB, E);
     for (int i = 0; i < 3; i++)
-        f->p_WB[i] += (double)step[i];
+        belief->p_WB[i] += (double)step[i];
     for (int i = 0; i < 9; i++)
-        f->R_WB[i] += change[i];
-    plr_so3_orthonormalise(f->R_WB);
+        belief->R_WB[i] += change[i];
+    plr_so3_orthonormalise(belief->R_WB);
 }
 
 bool plr_pose_is_correction(const plr_real xi[PLR_POSE_DIM]) {
@@ -23,10 +24,11 @@ bool plr_pose_is_correction(const plr_real xi[PLR_POSE_DIM]) {
     return plr_dot3(xi, xi) < max_way2 && plr_dot3(xi + 3, xi + 3) < PLR_MAX_CORRECTION_TURN2;
 }
 
-void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
+void plr_pose_correct(plr_belief *belief, const plr_real xi[PLR_POSE_DIM]) {
+    PLR_ASSERT(plr_pose_is_correction(xi));
     plr_real E[9], p[3];
     plr_se3_expm1(E, p, xi);
-    plr_pose_move(f, E, p);
+    plr_pose_move(belief, E, p);
 }
 
 /* From one pose to another, in the body of the first: the way, m, and the turn as a matrix. */
@@ -39,32 +41,33 @@ static void between(const plr_real R_from[9], const double p_from[3], const plr_
     plr_mat3_mul_tn(turn, R_from, R_to);
 }
 
-void plr_pose_moved_from(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
+void plr_pose_moved_from(const plr_belief *belief, const plr_real R_WB[9], const double p_WB[3],
                          plr_real moved[PLR_POSE_DIM]) {
     plr_real turn[9];
-    between(R_WB, p_WB, f->R_WB, f->p_WB, moved, turn);
+    between(R_WB, p_WB, belief->R_WB, belief->p_WB, moved, turn);
     plr_turn_of(moved + 3, turn);
 }
 
-void plr_pose_towards(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
+void plr_pose_towards(const plr_belief *belief, const plr_real R_WB[9], const double p_WB[3],
                       plr_real xi[PLR_POSE_DIM]) {
     plr_real turn[9];
-    between(f->R_WB, f->p_WB, R_WB, p_WB, xi, turn);
+    between(belief->R_WB, belief->p_WB, R_WB, p_WB, xi, turn);
     plr_so3_log(xi + 3, turn);
 }
 
-void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
+void plr_pose_reference(const plr_belief *belief, const plr_motion *motion, plr_real R_WB[9],
+                        double p_WB[3]) {
     plr_real moved[3];
-    memcpy(R_WB, f->R_WB, sizeof f->R_WB);
-    memcpy(p_WB, f->p_WB, sizeof f->p_WB);
-    if (!f->motion.pending)
+    memcpy(R_WB, belief->R_WB, sizeof belief->R_WB);
+    memcpy(p_WB, belief->p_WB, sizeof belief->p_WB);
+    if (!motion->pending)
         return;
     plr_real back[9];
-    plr_mat3_mul_nt(back, f->R_WB, f->motion.E); /* T D^-1 */
+    plr_mat3_mul_nt(back, belief->R_WB, motion->E); /* T D^-1 */
     for (int i = 0; i < 9; i++)
         R_WB[i] += back[i];
     plr_so3_orthonormalise(R_WB);
-    plr_mat3_vec(moved, R_WB, f->motion.p);
+    plr_mat3_vec(moved, R_WB, motion->p);
     for (int i = 0; i < 3; i++)
         p_WB[i] -= (double)moved[i];
 }
@@ -79,11 +82,4 @@ void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
             J[PLR_POSE_DIM * i + j] = R_WB[3 * i + j];
             J[PLR_POSE_DIM * i + 3 + j] = -RS[3 * i + j];
         }
-}
-
-void plr_filter_diverge(plr_filter *f) {
-    if (!f->diverged)
-        f->totals.diverged_ns = f->t_ns;
-    f->diverged = 1;
-    f->work.noise.open = 0; /* W is not added to P any more */
 }

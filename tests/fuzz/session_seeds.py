@@ -35,7 +35,7 @@ from pelorus.frames import (
     Twist,
 )
 from pelorus.schema import SENSORS
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, simulate
 
 Data = Twist | Stereo | Truth
@@ -166,13 +166,13 @@ def measured(recording: list[Message]) -> list[Message]:
 
 def by_imu(**changes: Any) -> list[Message]:
     """Batches of an IMU at 100 Hz in place of the twists."""
-    imu = Imu(imu_rate_hz=100.0, imu_batch=5)
+    imu = SimulatedImu(imu_rate_hz=100.0, imu_batch=5)
     return drive(known=False, imu=imu, **changes)
 
 
 def from_rest() -> list[Message]:
     """Without a START: the filter finds its tilt while the body stands, for 1.2 s."""
-    imu = Imu(imu_rate_hz=100.0, imu_batch=20, rest_s=1.2)
+    imu = SimulatedImu(imu_rate_hz=100.0, imu_batch=20, rest_s=1.2)
     messages = drive(known=False, imu=imu, duration_s=1.6, observations=3)
     return [m for m in messages if not isinstance(m, Start | Truth)]
 

@@ -76,9 +76,10 @@ static uint32_t crc(const void *bytes, size_t n) {
 
 static uint32_t crc_of_landmarks(void) {
     uint32_t sum = 0;
-    for (unsigned slot = 0; slot < filter.count; slot++) {
-        sum = plr_crc32(sum, (const uint8_t *)&filter.slots[slot].id, sizeof(uint32_t));
-        sum = plr_crc32(sum, (const uint8_t *)filter.slots[slot].x, sizeof filter.slots[slot].x);
+    for (unsigned slot = 0; slot < filter.belief.count; slot++) {
+        sum = plr_crc32(sum, (const uint8_t *)&filter.belief.slots[slot].id, sizeof(uint32_t));
+        sum = plr_crc32(sum, (const uint8_t *)filter.belief.slots[slot].x,
+                        sizeof filter.belief.slots[slot].x);
     }
     return sum;
 }
@@ -87,7 +88,7 @@ static uint32_t crc_of_landmarks(void) {
 static uint32_t crc_of_bias(void) {
     plr_twist now;
     double P_u[36];
-    const uint32_t sum = crc(filter.bias, sizeof filter.bias);
+    const uint32_t sum = crc(filter.belief.bias, sizeof filter.belief.bias);
     if (plr_filter_config(&filter)->process != PLR_PROCESS_IMU)
         return sum;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity(&filter, &now));
@@ -97,27 +98,28 @@ static uint32_t crc_of_bias(void) {
 }
 
 static uint32_t crc_of_sensitivity(void) {
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     uint32_t sum = 0;
-    for (unsigned k = 0; k < filter.par.calibrated.count; k++)
-        sum = plr_crc32(sum, (const uint8_t *)filter.S[k], n * sizeof *filter.S[k]);
-    if (filter.par.calibrated.estimated > 0)
-        sum =
-            plr_crc32(sum, (const uint8_t *)&filter.calibration.eye, sizeof filter.calibration.eye);
+    for (unsigned k = 0; k < filter.camera.errors.count; k++)
+        sum = plr_crc32(sum, (const uint8_t *)filter.belief.S[k], n * sizeof *filter.belief.S[k]);
+    if (filter.camera.errors.estimated > 0)
+        sum = plr_crc32(sum, (const uint8_t *)&filter.camera.estimate.eye,
+                        sizeof filter.camera.estimate.eye);
     return sum;
 }
 
 static void describe(char line[LINE], const plr_report *r) {
     plr_real P_xi[36];
-    const unsigned n = plr_covariance_dim(&filter);
-    plr_covariance_get(&filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
+    const unsigned n = plr_covariance_dim(&filter.belief);
+    plr_covariance_get(&filter.belief, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
     snprintf(line, LINE,
              "t %.9f p %.17g %.17g %.17g R %08x P_xi %08x bias %08x landmarks %08x P %08x S %08x "
              "used %u gated %u new %u evicted %u active %u status %d",
-             (double)r->t_ns * 1e-9, filter.p_WB[0], filter.p_WB[1], filter.p_WB[2],
-             crc(filter.R_WB, sizeof filter.R_WB), crc(P_xi, sizeof P_xi), crc_of_bias(),
-             crc_of_landmarks(), crc(filter.P, n * (n + 1) / 2 * sizeof *filter.P),
-             crc_of_sensitivity(), r->used, r->gated, r->created, r->evicted, r->active, r->status);
+             (double)r->t_ns * 1e-9, filter.belief.p_WB[0], filter.belief.p_WB[1],
+             filter.belief.p_WB[2], crc(filter.belief.R_WB, sizeof filter.belief.R_WB),
+             crc(P_xi, sizeof P_xi), crc_of_bias(), crc_of_landmarks(),
+             crc(filter.belief.P, n * (n + 1) / 2 * sizeof *filter.belief.P), crc_of_sensitivity(),
+             r->used, r->gated, r->created, r->evicted, r->active, r->status);
 }
 
 /* Says which words of two lines differ, each behind the name that stands before it. */
@@ -152,7 +154,7 @@ static void compare(const char *line) {
     print_differences(due, line);
     printf("  R is now ");
     for (int i = 0; i < 9; i++)
-        printf("%.9g%s", (double)filter.R_WB[i], i < 8 ? " " : "\n");
+        printf("%.9g%s", (double)filter.belief.R_WB[i], i < 8 ? " " : "\n");
     TEST_FAIL_MESSAGE("other bits; if the change is meant: docs/TESTING.md, \"The golden replay\"");
 }
 
@@ -393,19 +395,19 @@ static void test_slipping_wheels_compute_the_committed_bits(void) {
 
 static void test_an_imu_that_starts_at_rest_computes_the_committed_bits(void) {
     check(&scenarios[5]);
-    TEST_ASSERT_TRUE(filter.inertial.started);
+    TEST_ASSERT_TRUE(filter.source.inertial.started);
     TEST_ASSERT_GREATER_THAN_UINT32(20, filter.totals.readings); /* wheel and standstill */
 }
 
 /* And fixes position and heading anew two seconds later. */
 static void test_an_imu_that_starts_in_motion_computes_the_committed_bits(void) {
     check(&scenarios[6]);
-    TEST_ASSERT_TRUE(filter.inertial.anchored);
+    TEST_ASSERT_TRUE(filter.source.inertial.anchored);
 }
 
 /* The same start, and all but the baseline is estimated on the way. */
 static void test_an_estimated_calibration_computes_the_committed_bits(void) {
     check(&scenarios[7]);
-    TEST_ASSERT_EQUAL_UINT(10, filter.par.calibrated.estimated);
-    TEST_ASSERT_TRUE(filter.calibration.told[0] < PLR_R(0.9));
+    TEST_ASSERT_EQUAL_UINT(10, filter.camera.errors.estimated);
+    TEST_ASSERT_TRUE(filter.camera.estimate.told[0] < PLR_R(0.9));
 }

@@ -58,7 +58,7 @@ EXACT: Config = {"focal-sigma": 0.0, "baseline-sigma": 0.0, "camera-turn-sigma":
 
 @dataclass(frozen=True)
 class Wrong:
-    """What the filter is not told. As drawn from its settings: nothing but `drawn`."""
+    """What the filter is not told; with the defaults only what is `drawn` from its settings."""
 
     drawn: bool = False  # the camera is wrong by as much as the filter takes for possible
     askew_deg: float = 0.0
@@ -70,7 +70,7 @@ class Wrong:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of all runs and frames: (runs, frames), and of the errors (runs, frames, 6)."""
+    """All runs: arrays (runs, frames), and the errors and sigmas (runs, frames, 6)."""
 
     nees: Floats
     error: Floats
@@ -78,7 +78,7 @@ class Outcome:
     good: NDArray[np.bool_]
 
     def silent(self) -> float:
-        """The share of the frames that are GOOD though an error is beyond 5 sigma."""
+        """Returns the share of the frames that are GOOD though an error is beyond 5 sigma."""
         beyond = (abs(self.error) > 5 * self.sigma).any(axis=2)
         return float((beyond & self.good).mean())
 
@@ -87,14 +87,14 @@ class Outcome:
 
 
 def cross_matrix(w: Floats) -> Floats:
-    """(..., 3) -> (..., 3, 3)."""
+    """Returns (..., 3, 3) of (..., 3)."""
     zero = np.zeros_like(w[..., 0])
     rows = (zero, -w[..., 2], w[..., 1], w[..., 2], zero, -w[..., 0], -w[..., 1], w[..., 0], zero)
     return np.stack(rows, axis=-1).reshape(*w.shape, 3)
 
 
 def turned(w: Floats) -> tuple[Floats, Floats]:
-    """exp([w]x), and the matrix V that makes rho the translation V rho of a screw."""
+    """Returns exp([w]x), and the matrix V with V rho the translation of a screw."""
     angle = np.maximum(np.linalg.norm(w, axis=-1), 1e-12)[..., None, None]
     K = cross_matrix(w)
     R = np.eye(3) + np.sin(angle) / angle * K + (1 - np.cos(angle)) / angle**2 * K @ K
@@ -103,7 +103,7 @@ def turned(w: Floats) -> tuple[Floats, Floats]:
 
 
 def screw(R: Floats, p: Floats) -> Floats:
-    """(rho, theta) of a motion that turns by less than half a turn."""
+    """Returns (rho, theta) of a motion that turns by less than half a turn."""
     sine = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
     angle = np.arctan2(np.linalg.norm(sine), (np.trace(R) - 1) / 2)
     theta = sine * (angle / np.sin(angle) if angle > 1e-6 else 1.0)
@@ -114,7 +114,7 @@ def screw(R: Floats, p: Floats) -> Floats:
 
 
 def twists(rng: np.random.Generator, steps: int) -> Floats:
-    """True velocity and rate in the body, (steps, 6), each held for a step: a winding drive."""
+    """Returns true velocity and rate in the body, (steps, 6), each held for a step."""
     t = np.arange(steps) * STEP_S
     largest = np.array([0.3, 0.05, 0.05, 0.05, 0.05, 0.4])
     hertz, phase = rng.uniform(0.03, 0.3, (3, 6)), rng.uniform(0, 2 * np.pi, (3, 6))
@@ -124,7 +124,7 @@ def twists(rng: np.random.Generator, steps: int) -> Floats:
 
 
 class Camera:
-    """Projects, as it truly is, and follows tracks."""
+    """The true camera, which projects points and follows tracks."""
 
     def __init__(self, rng: np.random.Generator, wrong: Wrong) -> None:
         drawn = rng.normal(size=5) * wrong.drawn
@@ -144,14 +144,14 @@ class Camera:
         return q
 
     def pixels(self, q: Floats) -> Floats:
-        """(n, 4) of uL, vL, uR, vR."""
+        """Returns (n, 4) of uL, vL, uR, vR."""
         u, v = CX + self.focal * q[:, 0] / q[:, 2], CY + self.focal * q[:, 1] / q[:, 2]
         return np.stack((u, v, u - self.focal * self.baseline_m / q[:, 2], v), axis=1)
 
     def look(self, R: Floats, p: Floats, twist: Floats) -> tuple[NDArray[np.int_], Floats]:
-        """The ids and pixels of a frame; then points that left the picture are replaced."""
+        """Returns the ids and pixels of a frame; then replaces points that left the picture."""
         q = self.in_camera(R, p)
-        if self.wrong.shutter_s:  # a row is read when the camera has moved on
+        if self.wrong.shutter_s:  # a row is read after the camera has moved on
             late = self.wrong.shutter_s * (self.pixels(q)[:, 1:2] / HEIGHT - 0.5)
             flow = (-twist[:3] - np.cross(twist[3:], (q - T_CB) @ self.R)) @ self.R.T
             q = q + late * flow
@@ -172,7 +172,7 @@ class Camera:
         return self.ids[:seen], pixels + self.noise[:seen] + drift
 
     def move(self, way: Floats) -> None:
-        """Points that move along."""
+        """Moves the points that move along."""
         self.points = self.points + np.outer(self.moves, 0.2 * way)
 
     def _keep(self, which: NDArray[np.bool_]) -> None:
@@ -193,14 +193,14 @@ class Camera:
 
 
 def filter_of(config: Config, precision: Precision) -> Filter:
-    """That is told the calibration."""
+    """Returns a filter with the calibration."""
     told = Calibration(FX, FX, CX, CY, BASELINE_M, R_CB, T_CB)
     settings = {"slots": 40, "pixel-sigma": PIXEL_SIGMA} | config
     return Filter(told, settings, precision=precision)
 
 
 def compared(filter: Filter, R: Floats, p: Floats) -> tuple[float, Floats, Floats]:
-    """NEES, error and sigmas of the pose beside the true one."""
+    """Returns NEES, error and sigmas of the pose against the true one."""
     R_found, p_found = filter.pose()
     P = filter.pose_covariance()
     e = screw(R_found.T @ R, R_found.T @ (p - p_found))
@@ -210,14 +210,14 @@ def compared(filter: Filter, R: Floats, p: Floats) -> tuple[float, Floats, Float
 def frame(
     filter: Filter, camera: Camera, t_ns: int, R: Floats, p: Floats, twist: Floats
 ) -> tuple[float, Floats, Floats, bool]:
-    """What the camera sees there is given to the filter: as compared, and whether it is GOOD."""
+    """Gives the filter what the camera sees; returns `compared`, and whether it is GOOD."""
     ids, pixels = camera.look(R, p, twist)
     report = filter.update(t_ns, observations(ids, pixels))
     return *compared(filter, R, p), report.health == GOOD
 
 
 def drive(seed: int, seconds: float, wrong: Wrong, config: Config, precision: Precision) -> Outcome:
-    """One run, as an Outcome of one row."""
+    """Returns one run, as an Outcome of one row."""
     rng = np.random.default_rng([20, seed])
     steps = round(seconds / STEP_S)
     true = twists(rng, steps)
@@ -245,7 +245,7 @@ def drive(seed: int, seconds: float, wrong: Wrong, config: Config, precision: Pr
 def flight(
     seed: int, seconds: float, wrong: Wrong, config: Config, precision: Precision
 ) -> Outcome:
-    """One run by a raw IMU, whose start is known but for what is drawn."""
+    """Returns one run by a raw IMU, whose start is known but for what is drawn."""
     rng = np.random.default_rng([21, seed])
     steps, h = round(seconds / IMU_S), IMU_S
     t = (np.arange(steps + 2) - 0.5) * h  # a reading stands for the time from t[k] to t[k + 1]
@@ -294,14 +294,14 @@ def driven(
     precision: Precision = "float32",
     run: Callable[[int, float, Wrong, Config, Precision], Outcome] = drive,
 ) -> Outcome:
-    """All runs."""
+    """Returns all runs."""
     all_of_them = [run(seed, seconds, wrong, config, precision) for seed in range(runs)]
     parts = zip(*(vars(one).values() for one in all_of_them), strict=True)
     return Outcome(*(np.concatenate(part) for part in parts))
 
 
 def honest(runs: int, seconds: float, config: Config, precision: Precision, by_imu: bool) -> bool:
-    """Prints NEES/6 at the checkpoints; whether each is within its bounds."""
+    """Prints NEES/6 at the checkpoints; returns whether each is within its bounds."""
     run = flight if by_imu else drive
     outcome = driven(runs, seconds, Wrong(drawn=True), config, precision, run)
     last = outcome.nees.shape[1]
@@ -337,7 +337,7 @@ CASES = {
 
 
 def table(runs: int, seconds: float) -> None:
-    """Prints it, in Markdown."""
+    """Prints the table in Markdown."""
     print("| what is wrong | camera exact | defaults | error, own sigma with defaults |")
     print("|---|---|---|---|")
     for name, wrong in CASES.items():
@@ -350,7 +350,7 @@ def table(runs: int, seconds: float) -> None:
 
 
 def main() -> int:
-    """The exit status."""
+    """Returns the exit status."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Holds the sources against the rules of shape: how long a file and a function may be, who may
-touch the covariance, and where the dimensions and the setting `bias` may be known.
+touch the covariance, who may see the whole filter, and where the dimensions and the setting `bias`
+may be known.
 
 usage: shape.py PROJECT_ROOT
 
@@ -23,16 +24,28 @@ LONGEST_FUNCTION = 60
 FOLDERS = ("include", "src", "port", "tests", "tools")
 # Rooms that know the state by its blocks.
 ROOMS = ("state", "process", "sensor", "filter")
+# Rooms whose functions take what they touch, and never the whole filter.
+ROOMS_WITH_PARTS = (
+    "math",
+    "record",
+    "state",
+    "process",
+    "sensor",
+    "supervise",
+    "known_map",
+    "absent",
+)
 
 # The first line of a function's body in C as clang-format writes it: `{` ends a line that began, or
 # whose head began, in the first column. What else opens a brace there holds no statements.
 NO_FUNCTION = re.compile(r"^(typedef|struct|enum|union|extern|static const|const)\b[^(]*$|=\s*\{?$")
-TOUCHES_P = re.compile(r"\b(f|filter|like|copy)\s*(->|\.)\s*P\b|->P\[")
+TOUCHES_P = re.compile(r"\b(belief|f|filter|like|copy)\s*(->|\.)\s*P\b|->P\[")
 IN_A_STRUCT_OF_ITS_OWN = re.compile(r"\b(at|landmark|known|entering)->P\[")
 BARE_DIMENSION = re.compile(
     r"\[(36|21|18)\]|(?<![\w.-])6 \* | \* 6\b(?!\.)|< 6\b(?!\.)|\(6, |\[(12|18|24|30) \+ "
     r"|(?<![\w.(])(36|21|18)(?= [*+] )|(?<= [*+] )(36|21|18)\b|\+ (12|18|24|30)\b"
 )
+WHOLE_FILTER = re.compile(r"\bplr_filter\b")
 BIAS_SETTING = re.compile(r"\bconfig\s*(\.|->)\s*bias\b")
 
 
@@ -107,6 +120,19 @@ def check_covariance(root: Path) -> Iterator[Breach]:
                 yield Breach(path, number, "P is touched in src/state alone: covariance.h")
 
 
+def check_parts(root: Path) -> Iterator[Breach]:
+    """A function takes the structs that it touches: src/filter and the public calls alone see the
+    whole filter.
+    """
+    for room in ROOMS_WITH_PARTS:
+        for path in sorted((root / "src" / room).rglob("*.[ch]")):
+            for number, line in code_lines(path):
+                if WHOLE_FILTER.search(line):
+                    yield Breach(
+                        path, number, "the whole filter: take the structs that are touched"
+                    )
+
+
 def check_dimensions(root: Path) -> Iterator[Breach]:
     """Dimensions have names, and the setting `bias` is the process's alone."""
     for room in ROOMS:
@@ -118,7 +144,7 @@ def check_dimensions(root: Path) -> Iterator[Breach]:
                     yield Breach(path, number, "ask plr_has_block: `bias` is the process's setting")
 
 
-CHECKS = (check_files, check_functions, check_covariance, check_dimensions)
+CHECKS = (check_files, check_functions, check_covariance, check_parts, check_dimensions)
 
 
 def main() -> int:

@@ -38,24 +38,27 @@ FOLDERS: dict[str, set[str]] = {
     "absent": {"supervise", "known_map"},
     "session": {"session", "filter", "record", "math"},
 }
-FILTER_HEADERS = {
+# The parts of the filter's memory; state.h puts them side by side.
+PART_HEADERS = {
     "assertions.h",
     "config.h",
     "camera.h",
+    "belief.h",
+    "source.h",
+    "workspace.h",
+    "map.h",
     "types.h",
     "settings.h",
     "supervisor.h",
-    "state.h",
-    "filter.h",
-    "pelorus.h",
 }
+FILTER_HEADERS = PART_HEADERS | {"state.h", "filter.h", "pelorus.h"}
 # The public headers that a folder of src/ may see.
 HEADERS: dict[str, set[str]] = {
     "math": {"assertions.h", "config.h"},
     "record": FILTER_HEADERS | {"wire.h"},
-    "state": FILTER_HEADERS - {"filter.h", "pelorus.h"},
-    "process": FILTER_HEADERS - {"filter.h", "pelorus.h"},
-    "sensor": FILTER_HEADERS - {"filter.h", "pelorus.h"},
+    "state": PART_HEADERS,
+    "process": PART_HEADERS,
+    "sensor": PART_HEADERS,
     # The supervisor sees evidence, and no filter: neither its state nor its covariance.
     "supervise": {
         "assertions.h",
@@ -65,10 +68,10 @@ HEADERS: dict[str, set[str]] = {
         "supervisor.h",
         "types.h",
     },
-    "known_map": FILTER_HEADERS - {"filter.h", "pelorus.h"},
+    "known_map": PART_HEADERS,
     # Eyes see pictures, and no filter.
     "vision": {"assertions.h", "config.h", "types.h", "vision.h"},
-    "absent": FILTER_HEADERS - {"filter.h", "pelorus.h"},
+    "absent": PART_HEADERS,
     "filter": FILTER_HEADERS,
     "session": FILTER_HEADERS
     | {"wire.h", "port.h", "session.h", "session_parts.h", "state_store.h"},
@@ -94,10 +97,14 @@ SIBLINGS: dict[str, set[str]] = {
     "assertions.h": set(),
     "config.h": set(),
     "types.h": set(),
-    "camera.h": {"config.h", "types.h"},
+    "camera.h": {"config.h"},
+    "belief.h": {"config.h", "types.h"},
+    "source.h": {"config.h", "types.h"},
+    "workspace.h": {"config.h", "types.h"},
+    "map.h": {"types.h"},
     "settings.h": {"config.h", "types.h"},
     "supervisor.h": {"config.h", "types.h", "limits.def"},
-    "state.h": {"camera.h", "config.h", "settings.h", "supervisor.h", "types.h"},
+    "state.h": PART_HEADERS - {"assertions.h"},
     "filter.h": FILTER_HEADERS - {"filter.h", "pelorus.h"},
     "pelorus.h": FILTER_HEADERS - {"pelorus.h"},
     "vision.h": {"config.h", "types.h"},

@@ -84,7 +84,7 @@ static void demand_consistent(void) {
         fly(FRAMES);
         const imu_rig_errors e = imu_rig_errors_now();
         imu_rig_add(&sum, &e, 1.0 / RUNS);
-        TEST_ASSERT_EQUAL_UINT(ERRORS, imu_rig.filter.par.calibrated.count);
+        TEST_ASSERT_EQUAL_UINT(ERRORS, imu_rig.filter.camera.errors.count);
         calibration += wrong_camera_squared_error(&imu_rig.filter, drawn) / (RUNS * ERRORS);
     }
     printf("calibration %.3f\n", calibration);
@@ -118,8 +118,8 @@ static double misplaced_rad(double offset_s) {
         for (unsigned j = 0; j < 3; j++) {
             R[3 * i + j] = -seen[4 * i + j];
             for (unsigned k = 0; k < 3; k++)
-                R[3 * i + j] +=
-                    (double)(f->calibration.eye.R_CB[3 * i + k] * f->par.camera.R_CB[3 * k + j]);
+                R[3 * i + j] += (double)(f->camera.estimate.eye.R_CB[3 * i + k] *
+                                         f->camera.given.R_CB[3 * k + j]);
             sum += R[3 * i + j] * R[3 * i + j];
         }
     return sqrt(sum / 2);
@@ -137,7 +137,7 @@ static void test_the_camera_is_where_it_was_at_its_clocks_time(void) {
         imu_rig.options.gyro_noise = 1e-6;
         imu_rig.options.bias_gyro_sigma = 1e-6;
         begin(IMU_RIG_GIVEN, 1);
-        imu_rig.filter.calibration.moved[0] = (plr_real)offset_s[i];
+        imu_rig.filter.camera.estimate.moved[0] = (plr_real)offset_s[i];
         reseal(&imu_rig.filter);
         double worst = 0;
         for (unsigned k = 0; k < 60; k++) {
@@ -163,15 +163,16 @@ static void test_a_saved_state_goes_on_with_what_was_learnt(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&other, &told, &imu_rig.config, NULL));
     state_bytes_save(&state, f);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
-    TEST_ASSERT_TRUE(f->calibration.told[0] < 1);
-    TEST_ASSERT_EQUAL_MEMORY(&f->calibration, &other.calibration, sizeof other.calibration);
+    TEST_ASSERT_TRUE(f->camera.estimate.told[0] < 1);
+    TEST_ASSERT_EQUAL_MEMORY(&f->camera.estimate, &other.camera.estimate,
+                             sizeof other.camera.estimate);
     TEST_ASSERT_TRUE(state_bytes_same_filter(f, &other));
 }
 
 /* The told sigmas beside those of the prior, and how far the estimates have gone, in the latter. */
 static void demand_untouched(const char *what, double least, double most_off) {
     plr_calibration_result now;
-    const plr_calibrated *c = &imu_rig.filter.par.calibrated;
+    const plr_error_columns *c = &imu_rig.filter.camera.errors;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_calibration(&imu_rig.filter, &now));
     for (unsigned k = 0; k < c->count; k++) {
         const double prior = sqrt((double)c->variance[k]);

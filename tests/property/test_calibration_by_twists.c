@@ -76,7 +76,7 @@ static double squared_errors(double share, double *focal_left) {
         double Sigma[ERRORS * ERRORS];
         begin(seed);
         drive(share);
-        TEST_ASSERT_EQUAL_UINT(ERRORS, filter.par.calibrated.count);
+        TEST_ASSERT_EQUAL_UINT(ERRORS, filter.camera.errors.count);
         wrong_camera_covariance(&filter, Sigma);
         *focal_left = fmax(*focal_left, sqrt(Sigma[ERRORS + 1]) / config.focal_sigma);
         sum += wrong_camera_squared_error(&filter, drawn) / (RUNS * ERRORS);
@@ -108,7 +108,8 @@ static void test_a_saved_state_goes_on_with_what_is_usual(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&other, &told, &config, NULL));
     state_bytes_save(&state, &filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
-    TEST_ASSERT_TRUE(filter.calibration.excess > 2);
-    TEST_ASSERT_EQUAL_MEMORY(&filter.calibration, &other.calibration, sizeof other.calibration);
+    TEST_ASSERT_TRUE(filter.camera.estimate.excess > 2);
+    TEST_ASSERT_EQUAL_MEMORY(&filter.camera.estimate, &other.camera.estimate,
+                             sizeof other.camera.estimate);
     TEST_ASSERT_TRUE(state_bytes_same_filter(&filter, &other));
 }

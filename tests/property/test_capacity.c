@@ -26,17 +26,18 @@ static unsigned rows_of(unsigned slots) {
 /* Marks all of P behind the rows in use, and all slots behind the last. */
 static void mark_the_rest(void) {
     for (size_t i = plr_packed_row(rows_of(rig.config.slots)); i < PLR_PACKED_SIZE; i++)
-        rig.filter.P[i] = PLR_R(-4321);
-    memset(rig.filter.slots + rig.config.slots, 0xA5,
-           (PLR_MAX_LANDMARKS - rig.config.slots) * sizeof *rig.filter.slots);
+        rig.filter.belief.P[i] = PLR_R(-4321);
+    memset(rig.filter.belief.slots + rig.config.slots, 0xA5,
+           (PLR_MAX_LANDMARKS - rig.config.slots) * sizeof *rig.filter.belief.slots);
 }
 
 static void demand_marks(const char *at) {
     for (size_t i = plr_packed_row(rows_of(rig.config.slots)); i < PLR_PACKED_SIZE; i++)
-        if (!(rig.filter.P[i] <= PLR_R(-4321) && rig.filter.P[i] >= PLR_R(-4321)))
+        if (!(rig.filter.belief.P[i] <= PLR_R(-4321) && rig.filter.belief.P[i] >= PLR_R(-4321)))
             TEST_FAIL_MESSAGE(at);
-    const uint8_t *slots = (const uint8_t *)(rig.filter.slots + rig.config.slots);
-    for (size_t i = 0; i < (PLR_MAX_LANDMARKS - rig.config.slots) * sizeof *rig.filter.slots; i++)
+    const uint8_t *slots = (const uint8_t *)(rig.filter.belief.slots + rig.config.slots);
+    for (size_t i = 0; i < (PLR_MAX_LANDMARKS - rig.config.slots) * sizeof *rig.filter.belief.slots;
+         i++)
         if (slots[i] != 0xA5)
             TEST_FAIL_MESSAGE(at);
 }
@@ -50,11 +51,11 @@ static void check_capacity(unsigned slots, uint8_t model, uint8_t bias) {
     rig_begin();
     mark_the_rest();
     rig_drive(3);
-    TEST_ASSERT_LESS_OR_EQUAL_UINT_MESSAGE(slots, rig.filter.count, at);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT_MESSAGE(slots, rig.filter.belief.count, at);
     if (slots <= 20)
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(slots, rig.filter.count, at);
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(rig.filter.count, rig.report.active, at);
-    TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&rig.filter), at);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(slots, rig.filter.belief.count, at);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(rig.filter.belief.count, rig.report.active, at);
+    TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&rig.filter.belief), at);
     demand_marks(at);
     TEST_ASSERT_TRUE_MESSAGE(specimen_gives_finite_numbers(&rig.filter), at);
 }
@@ -82,7 +83,7 @@ static void test_the_build_can_be_filled_to_the_last_slot(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
         frame.t_ns += 100000000;
     }
-    TEST_ASSERT_EQUAL_UINT(count, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(count, rig.filter.belief.count);
     TEST_ASSERT_EQUAL_UINT(count, rig.report.used);
     TEST_ASSERT_TRUE(specimen_gives_finite_numbers(&rig.filter));
 }

@@ -65,7 +65,7 @@ static void compare(unsigned frame) {
     char at[32];
     snprintf(at, sizeof at, "frame %u", frame);
     twin_demand_same(&twins.book, &twins.filter, 1e-10, REAL_EPSILON, at);
-    unpack_symmetric(P, twins.filter.P, textbook_dim(&twins.book));
+    unpack_symmetric(P, twins.filter.belief.P, textbook_dim(&twins.book));
     TEST_ASSERT_TRUE_MESSAGE(oracle_cholesky(textbook_dim(&twins.book), P), at);
 }
 
@@ -81,13 +81,13 @@ static void run(unsigned of_every, unsigned contradicted) {
 
 static void test_a_contradicted_frame_is_schmidts_update(void) {
     run(1, 1);
-    TEST_ASSERT_DOUBLE_WITHIN(0, 0, (double)twins.filter.bias[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0, 0, (double)twins.filter.belief.bias[0]);
 }
 
 static void test_frames_that_teach_the_biases_in_between_agree_too(void) {
     run(3, 1);
     run(20, 10);
-    TEST_ASSERT_GREATER_THAN_DOUBLE(0, fabs((double)twins.filter.bias[0]));
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, fabs((double)twins.filter.belief.bias[0]));
 }
 
 /* Twists that are off by dozens of pixels a frame: the gain is nearly all of the motion's. */

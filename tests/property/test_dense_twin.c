@@ -80,17 +80,17 @@ static void adopt(const plr_frame *frame) {
 
 /* In this frame, after many that rejected it. */
 static bool restarted(const plr_slot *slot) {
-    return slot->last_frame == twins.filter.frame_number && slot->restarts > 0 &&
+    return slot->last_frame == twins.filter.belief.frame_number && slot->restarts > 0 &&
            slot->accepted + slot->rejected == 0;
 }
 
 /* What the filter has restarted is replaced in the oracle. */
 static void restart(const plr_frame *frame) {
-    for (unsigned slot = 0; slot < twins.filter.count; slot++)
-        for (unsigned i = 0; i < frame->count && restarted(&twins.filter.slots[slot]); i++)
-            if (frame->observations[i].id == twins.filter.slots[slot].id)
+    for (unsigned slot = 0; slot < twins.filter.belief.count; slot++)
+        for (unsigned i = 0; i < frame->count && restarted(&twins.filter.belief.slots[slot]); i++)
+            if (frame->observations[i].id == twins.filter.belief.slots[slot].id)
                 TEST_ASSERT_TRUE(textbook_create(
-                    &twins.book, textbook_find(&twins.book, twins.filter.slots[slot].id),
+                    &twins.book, textbook_find(&twins.book, twins.filter.belief.slots[slot].id),
                     frame->t_ns, &frame->observations[i]));
 }
 
@@ -304,7 +304,7 @@ static void test_pose_covariance_between_frames_agrees(void) {
 /* World positions and covariances of landmarks, through pose and cross terms. */
 static void run_landmarks(void) {
     run_frames();
-    for (unsigned slot = 0; slot < twins.filter.count; slot++) {
+    for (unsigned slot = 0; slot < twins.filter.belief.count; slot++) {
         plr_landmark landmark;
         plr_landmark due;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&twins.filter, slot, &landmark));

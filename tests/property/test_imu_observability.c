@@ -46,10 +46,10 @@ static stretch flown[FRAMES];
 
 static void note_points(stretch *s) {
     const plr_filter *f = &imu_rig.filter;
-    s->count = f->count;
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        s->id[slot] = f->slots[slot].id;
-        to_doubles(s->q[slot], f->slots[slot].x, 3);
+    s->count = f->belief.count;
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        s->id[slot] = f->belief.slots[slot].id;
+        to_doubles(s->q[slot], f->belief.slots[slot].x, 3);
     }
 }
 
@@ -70,7 +70,7 @@ static void fly_and_note(stretch *s) {
     }
     s->D[15] = 1;
     to_doubles(s->B, f->motion.B, 6 * DRIVER);
-    to_doubles(s->V, f->core_motion.V, 3 * DRIVER);
+    to_doubles(s->V, f->motion.core.V, 3 * DRIVER);
     pose_now(before);
     imu_rig_frame();
     pose_now(after);
@@ -261,7 +261,7 @@ static void test_all_else_is_observed(void) {
 /* Sigma of a row of the state. */
 static double sigma_of(const plr_filter *f, unsigned row) {
     const size_t diagonal = (size_t)row * (row + 1) / 2 + row;
-    return sqrt((double)f->P[diagonal]);
+    return sqrt((double)f->belief.P[diagonal]);
 }
 
 /* `other` and the rig's filter agree, but for the pose: differences in sigmas, which are small numbers of
@@ -269,23 +269,25 @@ static double sigma_of(const plr_filter *f, unsigned row) {
 static void demand_agreement(void) {
     const plr_filter *f = &imu_rig.filter;
     const double near = 1e5 * eps;
-    TEST_ASSERT_EQUAL_UINT(f->count, other.count);
-    TEST_ASSERT_GREATER_THAN_UINT(10, f->count);
+    TEST_ASSERT_EQUAL_UINT(f->belief.count, other.belief.count);
+    TEST_ASSERT_GREATER_THAN_UINT(10, f->belief.count);
     for (unsigned i = 0; i < 9; i++) {
-        const double own = i < 3 ? (double)f->inertial.velocity[i] : (double)f->bias[i - 3];
-        const double its = i < 3 ? (double)other.inertial.velocity[i] : (double)other.bias[i - 3];
+        const double own = i < 3 ? (double)f->belief.velocity[i] : (double)f->belief.bias[i - 3];
+        const double its =
+            i < 3 ? (double)other.belief.velocity[i] : (double)other.belief.bias[i - 3];
         const double sigma = sigma_of(f, VELOCITY + i);
         TEST_ASSERT_DOUBLE_WITHIN(near * sigma, own, its);
         TEST_ASSERT_DOUBLE_WITHIN(near * sigma, sigma, sigma_of(&other, VELOCITY + i));
     }
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        TEST_ASSERT_EQUAL_UINT32(f->slots[slot].id, other.slots[slot].id);
-        const double range = hypot(hypot((double)f->slots[slot].x[0], (double)f->slots[slot].x[1]),
-                                   (double)f->slots[slot].x[2]);
+    for (unsigned slot = 0; slot < f->belief.count; slot++) {
+        TEST_ASSERT_EQUAL_UINT32(f->belief.slots[slot].id, other.belief.slots[slot].id);
+        const double range =
+            hypot(hypot((double)f->belief.slots[slot].x[0], (double)f->belief.slots[slot].x[1]),
+                  (double)f->belief.slots[slot].x[2]);
         for (unsigned i = 0; i < 3; i++) {
-            const unsigned row = plr_covariance_row(f, slot) + i;
-            TEST_ASSERT_DOUBLE_WITHIN(near * range * 0.01, (double)f->slots[slot].x[i],
-                                      (double)other.slots[slot].x[i]);
+            const unsigned row = plr_covariance_row(&f->belief, slot) + i;
+            TEST_ASSERT_DOUBLE_WITHIN(near * range * 0.01, (double)f->belief.slots[slot].x[i],
+                                      (double)other.belief.slots[slot].x[i]);
             TEST_ASSERT_DOUBLE_WITHIN(near * sigma_of(f, row), sigma_of(f, row),
                                       sigma_of(&other, row));
         }

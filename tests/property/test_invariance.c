@@ -48,8 +48,9 @@ static void some_start(plr_pose *start) {
 }
 
 static bool same_covariance(void) {
-    const unsigned n = plr_covariance_dim(&rig.filter);
-    return moved.count == rig.filter.count && same_bits(rig.filter.P, moved.P, n * (n + 1) / 2);
+    const unsigned n = plr_covariance_dim(&rig.filter.belief);
+    return moved.belief.count == rig.filter.belief.count &&
+           same_bits(rig.filter.belief.P, moved.belief.P, n * (n + 1) / 2);
 }
 
 static void check_body(bool bias) {
@@ -57,11 +58,11 @@ static void check_body(bool bias) {
     some_start(&start);
     rig.config.bias = bias;
     drive(&start);
-    TEST_ASSERT_GREATER_THAN_UINT(10, rig.filter.count);
+    TEST_ASSERT_GREATER_THAN_UINT(10, rig.filter.belief.count);
     TEST_ASSERT_TRUE(same_covariance());
-    for (unsigned slot = 0; slot < moved.count; slot++)
-        TEST_ASSERT_TRUE(same_bits(rig.filter.slots[slot].x, moved.slots[slot].x, 3));
-    TEST_ASSERT_TRUE(same_bits(rig.filter.bias, moved.bias, 6));
+    for (unsigned slot = 0; slot < moved.belief.count; slot++)
+        TEST_ASSERT_TRUE(same_bits(rig.filter.belief.slots[slot].x, moved.belief.slots[slot].x, 3));
+    TEST_ASSERT_TRUE(same_bits(rig.filter.belief.bias, moved.belief.bias, 6));
 
     /* and the poses are the same drive, seen from another frame */
     double A[16], B[16], G[16], GA[16];

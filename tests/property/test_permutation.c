@@ -76,6 +76,6 @@ static void test_shuffled_new_ids_take_the_same_slots(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, NULL));
     frame.observations = order;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&shuffled, &frame, NULL));
-    TEST_ASSERT_EQUAL_UINT(5, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(5, rig.filter.belief.count);
     TEST_ASSERT_TRUE(specimen_same_state(&rig.filter, &shuffled));
 }

@@ -41,7 +41,7 @@ static void run(void) {
         frame.budget = (uint16_t)(rng_below(&chance, 4) ? PLR_NO_BUDGET : rng_below(&chance, 20));
         TEST_ASSERT_EQUAL_INT_MESSAGE(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report),
                                       at);
-        TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&rig.filter), at);
+        TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&rig.filter.belief), at);
         if (k % EVERY == EVERY - 1) {
             double P_xi[36];
             TEST_ASSERT_GREATER_THAN_DOUBLE(0, rig_smallest_correlation());

@@ -56,5 +56,5 @@ static void test_two_filters_do_not_influence_one_another(void) {
     }
     TEST_ASSERT_TRUE(specimen_same_state(&alone[0], &together[0]));
     TEST_ASSERT_TRUE(specimen_same_state(&alone[1], &together[1]));
-    TEST_ASSERT_FALSE(alone[0].count == alone[1].count);
+    TEST_ASSERT_FALSE(alone[0].belief.count == alone[1].belief.count);
 }

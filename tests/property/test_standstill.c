@@ -39,7 +39,7 @@ static void check_hours(bool bias) {
     for (unsigned k = 0; k < FRAMES; k += EVERY) {
         rig_stand(EVERY);
         demand_still_there();
-        TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
+        TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter.belief));
         /* all that is left uncertain is common to all landmarks, so their correlations are near 1,
          * and every frame leaves one rounding there */
         TEST_ASSERT_GREATER_THAN_DOUBLE(-(double)(k + EVERY) * REAL_EPSILON,
@@ -66,7 +66,7 @@ static void test_hours_without_noise_stay_exact(void) {
     each_axis(rig.config.gyro_sigma, 0);
     rig_begin();
     rig_stand(FRAMES);
-    TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
+    TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter.belief));
     TEST_ASSERT_GREATER_THAN_DOUBLE(0, rig_smallest_correlation());
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.p_WB[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.belief.p_WB[0]);
 }

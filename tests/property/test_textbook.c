@@ -69,7 +69,7 @@ static unsigned row_of(unsigned i) {
     const unsigned head = textbook_row(&book, 0);
     if (i < head)
         return i;
-    const unsigned landmark = textbook_find(&book, rig.filter.slots[(i - head) / 3].id);
+    const unsigned landmark = textbook_find(&book, rig.filter.belief.slots[(i - head) / 3].id);
     TEST_ASSERT_NOT_EQUAL_UINT(book.count, landmark);
     return textbook_row(&book, landmark) + (i - head) % 3;
 }
@@ -81,7 +81,7 @@ static void compare(unsigned frame) {
     plr_pose expected;
     char at[32];
     snprintf(at, sizeof at, "frame %u", frame);
-    TEST_ASSERT_EQUAL_UINT(book.count, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(book.count, rig.filter.belief.count);
     const plr_pose pose = pose_of(&rig.filter);
     memcpy(T, book.T_WB, sizeof T);
     rigid_to_pose(&expected, T);
@@ -93,7 +93,8 @@ static void compare(unsigned frame) {
         for (unsigned j = 0; j <= i; j++) {
             const unsigned k = row_of(i), l = row_of(j);
             const double gap =
-                fabs((double)rig.filter.P[plr_packed_at(i, j)] - textbook_covariance(&book, k, l)) /
+                fabs((double)rig.filter.belief.P[plr_packed_at(i, j)] -
+                     textbook_covariance(&book, k, l)) /
                 sqrt(textbook_covariance(&book, k, k) * textbook_covariance(&book, l, l));
             worst = gap > worst ? gap : worst;
         }

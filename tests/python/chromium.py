@@ -121,7 +121,7 @@ def chromium() -> str | None:
 
 @contextmanager
 def tab(kind: type[OneTab]) -> Iterator[OneTab]:
-    """Of a browser of its own. Skips the test where there is none."""
+    """Opens a tab of a browser of its own; skips the test where there is none."""
     program = chromium()
     if program is None:
         pytest.skip(f"there is no Chromium ({', '.join(NAMES)}): apt-get install chromium")

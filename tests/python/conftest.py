@@ -194,5 +194,5 @@ def compare(pelorus: Callable[..., Said], tmp_path: Path) -> Compare:
 
 @pytest.fixture
 def log(tmp_path: Path) -> list[Message]:
-    """Of a robot with settings of its own."""
+    """Returns the log of a robot with settings of its own."""
     return robots_log(tmp_path, drive(), "--slots", "20", "--bias", "on")

@@ -9,6 +9,8 @@ import os
 from collections.abc import Iterable
 from typing import TypeVar
 
+import pytest
+
 LONG = os.environ.get("PELORUS_LONG", "0") == "1"
 T = TypeVar("T")
 
@@ -17,3 +19,6 @@ def draws(of: Iterable[T]) -> list[T]:
     """Returns all of them in a long run, else the first."""
     every = list(of)
     return every if LONG else every[:1]
+
+
+long_run = pytest.mark.skipif(not LONG, reason="takes minutes: tools/test.sh --long")

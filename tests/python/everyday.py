@@ -58,7 +58,7 @@ class Settings:
 
 
 def drawn(seed: int) -> Settings:
-    """Of one seed."""
+    """Draws the settings of one seed."""
     chance = np.random.default_rng([seed, 1])
 
     def between(low: float, high: float) -> float:

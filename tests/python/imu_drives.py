@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from drives import PERFECT
 from pelorus import se3
-from pelorus.simulation.imu import Imu, ImuFaults
+from pelorus.simulation.imu import ImuFaults, SimulatedImu
 from pelorus.simulation.simulate import Options, Simulation, simulate
 from scipy.spatial.transform import Rotation
 
-EXACT = Imu(
+EXACT = SimulatedImu(
     imu_rate_hz=200.0,
     gyro_noise=0.0,
     accel_noise=0.0,
@@ -24,11 +24,11 @@ EXACT = Imu(
     accel_walk=0.0,
     bias_accel_sigma_mps2=0.0,
 )
-NOISY = Imu(imu_rate_hz=200.0)
+NOISY = SimulatedImu(imu_rate_hz=200.0)
 BIAS_GYRO = 0.01
 
 
-def options(imu: Imu = EXACT, faults: ImuFaults | None = None, **changes: Any) -> Options:
+def options(imu: SimulatedImu = EXACT, faults: ImuFaults | None = None, **changes: Any) -> Options:
     """Without noise of the pixels, unless asked for."""
     return replace(
         PERFECT, **({"duration_s": 6.0} | changes), imu=imu, imu_faults=faults or ImuFaults()

@@ -330,7 +330,7 @@ def clean_pieces(name: str, whole: Recording) -> tuple[int, int]:
 
 
 def injected(name: str, recording: Recording) -> tuple[int, int, int]:
-    """Of so many faults so many are named rightly, and so many others cannot be told."""
+    """Returns how many faults were named right, of how many, and how many cannot be named."""
     right, asked, beyond = 0, 0, 0
     known = Known.of(first_part(recording))
     own = {fault.name for fault in found_in(recording)}

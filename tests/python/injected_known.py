@@ -18,9 +18,9 @@ from pelorus.faults.amounts import (
     place_covariance,
 )
 from pelorus.faults.geometry import PITCH_OFF_DEG, PITCH_SIGMAS
-from pelorus.faults.mounting import SURE, Rates
+from pelorus.faults.mounting import SURE, MotionPairs
 from pelorus.faults.moving import moving
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import two_views
 from pelorus.recording import Recording
@@ -43,7 +43,7 @@ class Known:
         """Why this fault is none that the drive could tell; empty if it could. What the clean
         drive itself is off by counts, too: it may make up for the fault.
         """
-        if not self.agreed.told:
+        if not self.agreed.is_known:
             return "too few frames"
         of_others = {"moving": _moves, "mirrored": _turns, "axes": _turns, "lever": self._lever}
         if name in of_others:
@@ -109,9 +109,9 @@ SIZES = {
 
 
 def _turns(wrong: Recording) -> str:
-    seen = Seen.of(wrong, two_views(wrong.tracks, wrong.header.camera, 1))
+    seen = CameraMotion.of(wrong, two_views(wrong.tracks, wrong.header.camera, 1))
     told = TwistBody(wrong).rates(wrong.frame_t_ns, 1, 0.0)[:, 3:]
-    found = Rates(np.where(seen.usable[:, None], seen.rates[:, 3:], np.nan), told).alone()
+    found = MotionPairs(np.where(seen.usable[:, None], seen.rates[:, 3:], np.nan), told).alone()
     if SURE * found.sigma < 1:  # T is 0 or -1
         return ""
     return f"the turns have other axes by {-found.effect:.2f} +- {found.sigma:.2f} of all"

@@ -74,7 +74,7 @@ class Scene:
 
 @cache
 def rays_of(model: str, intrinsics: tuple[float, ...], D: tuple[float, ...]) -> Floats:
-    """Of every pixel: the formula of the lens, inverted by trial and error."""
+    """Returns every pixel's ray: the lens' formula, inverted by iteration."""
     u, v = np.meshgrid(np.arange(WIDTH, dtype=float), np.arange(HEIGHT, dtype=float))
     wanted = np.stack((u.ravel(), v.ravel()), axis=-1)
     rays = (wanted - intrinsics[2:]) / intrinsics[:2]

@@ -63,7 +63,7 @@ def transform(parent: str, child: str, R: Any, p: Any) -> Fields:
 
 
 def options(**changes: Any) -> Options:
-    """Of a robot that sends tracks, and whose base is its IMU."""
+    """Returns options of a robot that sends tracks, and whose base is its IMU."""
     usual = {"tracks_type": "pelorus_msgs/msg/StereoTracks", "base_frame": ""}
     return Options(**(usual | changes))
 

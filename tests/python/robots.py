@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from everyday import LOOKS_AHEAD, ONE_S, Settings, tracks_of, waves
 from numpy.typing import NDArray
-from pelorus.converters.streams import Readings, Seen, Streams, Twists
+from pelorus.converters.streams import RawTracks, Readings, Streams, Twists
 from pelorus.frames import Camera, Header, Noise, TwistTiming
 from pelorus.inertial import GRAVITY_MPS2, Inertial
 from pelorus.rig.imu_model import ImuModel
@@ -57,7 +57,7 @@ class Drive:
 
 
 def drive(kind: str, by: str, seed: int) -> Drive:
-    """Of a kind of robot, with speeds, noises, rates, scene and place of the camera of its own."""
+    """Draws a drive of a kind of robot: speeds, noises, rates, scene and the camera's place."""
     chance = np.random.default_rng([seed, [*KINDS].index(kind), 7])
 
     def between(low: float, high: float) -> float:
@@ -89,7 +89,7 @@ def drive(kind: str, by: str, seed: int) -> Drive:
         image_height_px=size[1], name=f"{kind} {seed}",
     )  # fmt: skip
     here = Path(header.name)
-    seen = Seen(here, t_ns[at], tracks)
+    seen = RawTracks(here, t_ns[at], tracks)
     told = Trajectory(t_ns[at], truth)
     if by == BY_IMU:
         noise, readings = _imu(kind, t_ns, v, w, way, chance)

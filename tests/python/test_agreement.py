@@ -18,10 +18,10 @@ from pelorus.faults.agreement import Agreement, agreement
 from pelorus.faults.amounts import of_clock, of_lever, of_scale
 from pelorus.faults.clocks import TwoClocks
 from pelorus.faults.fault import Fault
-from pelorus.faults.mounting import Rates
+from pelorus.faults.mounting import MotionPairs
 from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.recording import Recording
 from pelorus.second_view import NOISE, inverse
@@ -266,7 +266,7 @@ def test_a_wrong_lever_is_not_told_as_a_turned_extrinsic(off: str) -> None:
     wrong = T._replace(p=-right if off == "the sign" else -T.R.T @ right)
     asked = []
 
-    def counted(recording: Recording, views: TwoViews, seen: Seen) -> Agreement:
+    def counted(recording: Recording, views: TwoViews, seen: CameraMotion) -> Agreement:
         asked.append(1)
         return agreement(recording, views, seen)
 
@@ -330,8 +330,8 @@ def test_axes_that_hardly_turn_are_told_from_mirrored_ones(seed: int) -> None:
     w = np.stack([np.convolve(chance.normal(0, x, 130), smooth, "valid") for x in spread], axis=1)
     seen = w + chance.normal(0, 0.005, w.shape)
     told = w + chance.normal(0, 0.005, w.shape)
-    assert not Rates(seen, told).alone().won
-    mirrored = Rates(seen, told * [-1, -1, 1]).alone()
+    assert not MotionPairs(seen, told).alone().won
+    mirrored = MotionPairs(seen, told * [-1, -1, 1]).alone()
     assert mirrored.won
     assert np.array_equal(np.diag(mirrored.F), [-1, -1, 1])
 

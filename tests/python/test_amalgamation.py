@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from draws import draws
 from pelorus.cli import main
 from replay_drive import BIN
 
@@ -63,7 +64,7 @@ def test_they_compile_without_a_warning_and_need_no_library(
 
 
 @pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
-@pytest.mark.parametrize("room", [0, 5])
+@pytest.mark.parametrize("room", draws([0, 5]))
 def test_a_build_with_no_room_for_it_is_without_what_estimates_the_calibration(
     two_files: Path, room: int
 ) -> None:

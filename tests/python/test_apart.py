@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from pelorus import se3, wire
 from pelorus.check import halves_alike
-from pelorus.check.apart import Apart, Inflated, Parts, compare, halves, of_points, windows
+from pelorus.check.apart import HalvesApart, Inflated, Parts, compare, halves, of_points, windows
 from pelorus.check.contents import recording_of, write
 from pelorus.check.options import Settings, options_of
 from pelorus.check.outcome import NOTHING, Bench
@@ -165,8 +165,8 @@ def test_no_noises_are_taken_that_bring_halves_no_nearer() -> None:
     class Asked:
         """Halves that are as far apart with any noises."""
 
-        def apart(self, settings: dict[str, str]) -> Apart:
-            return Apart({"near and far": 9.0 + 0 * len(settings)}, 4)
+        def apart(self, settings: dict[str, str]) -> HalvesApart:
+            return HalvesApart({"near and far": 9.0 + 0 * len(settings)}, 4)
 
     found = halves_alike.inflate(cast(Parts, Asked()), noises())
     assert not found.is_larger
@@ -180,7 +180,7 @@ def test_no_noises_are_taken_that_make_the_filter_surer(
     recording = tmp_path / "drive.plr"
     write(recording, drive(20))
     bench = Bench(built_programs().float32, recording, tmp_path)
-    apart, alike = (Apart({"near and far": ratio}, 4) for ratio in (9.0, 1.0))
+    apart, alike = (HalvesApart({"near and far": ratio}, 4) for ratio in (9.0, 1.0))
     monkeypatch.setattr(halves_alike, "inflate", lambda *_: Inflated(3.0, apart, alike))
     settings = {"pixel-sigma": "0.5"}
     sure = Tuned(settings, NOTHING, bench.run(settings), TrackNoise({}, float("nan")))

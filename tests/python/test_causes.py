@@ -15,13 +15,13 @@ from drives import at_rest, clean, with_stale_tracks
 from imu_drives import NOISY, noisy, options
 from numpy.typing import NDArray
 from pelorus.converters import full_scale, repeated
-from pelorus.converters.streams import Readings, Seen, Streams, Twists, _moves, recording
+from pelorus.converters.streams import RawTracks, Readings, Streams, Twists, _moves, recording
 from pelorus.faults import platform, resolution, sync
 from pelorus.faults.geometry import WORLD_SURE, _at_times, _in_world
 from pelorus.faults.imu_axes import _units
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.named import _beside_way, _pixels, _times
-from pelorus.faults.seen import Seen as SeenMotion
+from pelorus.faults.seen import CameraMotion as SeenMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import two_views
 from pelorus.faults.world_axes import world_axes
@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 # --- left and right of different moments ----------------------------------------------------------
 
 
-def looked_at(drive: Recording) -> sync.Apart | None:
+def looked_at(drive: Recording) -> sync.PictureDelay | None:
     return sync.apart(drive.tracks, drive.frame_t_ns, drive.header.camera)
 
 
@@ -116,7 +116,7 @@ def test_tracks_of_one_part_of_the_picture_are_no_other_resolution() -> None:
 
 
 def streams(drive: Recording) -> Streams:
-    frames = Seen(Path("stereo.csv"), drive.frame_t_ns, drive.tracks)
+    frames = RawTracks(Path("stereo.csv"), drive.frame_t_ns, drive.tracks)
     motion: Twists | Readings = Readings(Path("imu.csv"), drive.inertial)
     if not len(drive.inertial.t_ns):
         motion = Twists(Path("odom.csv"), drive.twist_t_ns, drive.v_B_mps, drive.w_B_radps)

@@ -179,13 +179,13 @@ def test_a_noise_that_a_drive_does_not_tell_is_said_and_stays() -> None:
     values = {"pixel": 1.0, "gyro": 1e-3, "accel": 4e-4}
     usual = bench.run(parameters.written(values, parameters.IMU))
     given = {"pixel": 2.0, "gyro": 5e-3, "accel": 2e-2}
-    found, words = tuning_imu.noises(bench, {}, search.Found(values, usual), given)  # type: ignore[arg-type]
+    found, words = tuning_imu.noises(bench, {}, search.BestFound(values, usual), given)  # type: ignore[arg-type]
     assert found.values == {"pixel": 1.0, "gyro": 1e-3, "accel": 2e-2}
     assert words.startswith(
         "accel-noise cannot be told within 3 times by this drive (0.02 is written)"
     )
     small = {**given, "accel": 4e-5}  # which would have the IMU believed more
-    kept, _ = tuning_imu.noises(bench, {}, search.Found(values, usual), small)  # type: ignore[arg-type]
+    kept, _ = tuning_imu.noises(bench, {}, search.BestFound(values, usual), small)  # type: ignore[arg-type]
     assert kept.values == values
 
 

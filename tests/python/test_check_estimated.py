@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from converted import Once
 from pelorus.check import verdict
-from pelorus.check.calibration import Calibration
+from pelorus.check.calibration import CalibrationDoubts
 from pelorus.check.estimated import Estimated, estimated, without_clock
 from pelorus.check.mount import Turned
 from pelorus.check.verdict import Grade
@@ -48,9 +48,9 @@ def in_body(recording: Path) -> Floats:
 
 
 def found(log: Sequence[Message], turn: Turned | None = None) -> Estimated:
-    told = estimated(log, Calibration(None, turn))
-    assert told is not None
-    return told
+    estimate = estimated(log, CalibrationDoubts(None, turn))
+    assert estimate is not None
+    return estimate
 
 
 def test_a_turn_that_filter_and_search_see_is_told_once(turned: Path) -> None:
@@ -60,10 +60,12 @@ def test_a_turn_that_filter_and_search_see_is_told_once(turned: Path) -> None:
     own = found(log, search)
     assert own.answers_turn
     assert not own.is_doubtful
-    said = list(verdict.of_calibration(Calibration(None, search), own))
+    said = list(verdict.of_calibration(CalibrationDoubts(None, search), own))
     assert [remark.grade for remark in said] == [Grade.GOOD]
     assert "corrected by turn of the camera about its" in said[0].text
-    assert [r.grade for r in verdict.of_calibration(Calibration(None, search))] == [Grade.CARE]
+    assert [r.grade for r in verdict.of_calibration(CalibrationDoubts(None, search))] == [
+        Grade.CARE
+    ]
 
 
 def test_a_search_that_sees_another_turn_is_told(turned: Path) -> None:
@@ -72,7 +74,7 @@ def test_a_search_that_sees_another_turn_is_told(turned: Path) -> None:
     own = found(log, search)
     assert own.is_doubtful
     assert "the search sees the camera turned otherwise" in own.words()
-    said = list(verdict.of_calibration(Calibration(None, search), own))
+    said = list(verdict.of_calibration(CalibrationDoubts(None, search), own))
     assert len(said) == 2
 
 
@@ -80,7 +82,7 @@ def test_a_turn_beyond_its_prior_names_the_setting(turned: Path) -> None:
     log = log_of(turned, "--camera-turn-sigma", "0.01")
     corrected = np.zeros(11)
     corrected[3] = 0.05
-    own = found([*log, replace(found(log).told, corrected=corrected)])
+    own = found([*log, replace(found(log).estimate, corrected=corrected)])
     assert own.off == ("camera-turn-sigma",)
     assert "more than 4 sigma by camera-turn-sigma" in own.words()
     assert own.is_doubtful
@@ -88,8 +90,8 @@ def test_a_turn_beyond_its_prior_names_the_setting(turned: Path) -> None:
 
 def test_a_part_that_the_filter_put_back_is_named(turned: Path) -> None:
     log = log_of(turned, "--camera-turn-sigma", "0.01")
-    told = found(log).told
-    own = found([*log, replace(told, estimated=told.estimated & ~1)])
+    estimate = found(log).estimate
+    own = found([*log, replace(estimate, estimated=estimate.estimated & ~1)])
     assert own.refused == ("baseline",)
     assert "refused baseline" in own.words()
     assert own.is_doubtful
@@ -97,10 +99,10 @@ def test_a_part_that_the_filter_put_back_is_named(turned: Path) -> None:
 
 def test_a_calibration_that_is_right_is_said_to_be(turned: Path) -> None:
     own = found(log_of(turned, "--camera-turn-sigma", "0.01"))
-    right = replace(own, told=replace(own.told, corrected=np.zeros(11)))
+    right = replace(own, estimate=replace(own.estimate, corrected=np.zeros(11)))
     assert "finds it right: baseline to" in right.words()
     assert (
-        estimated(replayed(built_programs().float32, messages_of(turned), []), Calibration())
+        estimated(replayed(built_programs().float32, messages_of(turned), []), CalibrationDoubts())
         is None
     )
 

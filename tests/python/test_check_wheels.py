@@ -13,11 +13,11 @@ import pytest
 from pelorus.check import wheels
 from pelorus.check.verdict import Grade, Remark
 from pelorus.explain import explain
-from pelorus.explain.finding import Cause
+from pelorus.explain.incident import Cause
 from pelorus.frames import Reading
 from pelorus.recording import Recording
 from pelorus.replay import replayed
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.readings import Sensing
 from pelorus.simulation.simulate import Options, simulate
 from replay_drive import BIN
@@ -28,7 +28,7 @@ HALF_M = 0.25  # of the track
 @pytest.fixture(scope="module")
 def drive() -> Recording:
     """A minute at 1 m/s, round and round."""
-    imu = Imu(imu_rate_hz=200.0, rest_s=2.0)
+    imu = SimulatedImu(imu_rate_hz=200.0, rest_s=2.0)
     sensing = {"wheel": Sensing(rate_hz=50.0, sigma=(0.03,))}
     options = Options(duration_s=60.0, speed_mps=1.0, lap_s=20.0, imu=imu, readings=sensing)
     return simulate(options).recording

@@ -25,7 +25,7 @@ SIGMA_M = 0.05
 
 
 def positions(folder: Path, drive: Recording, every: int) -> Path:
-    """Of the body's origin, with noise."""
+    """Writes positions of the body's origin, with noise."""
     t_ns, p = drive.truth_t_ns[every::every], drive.truth.p[every::every]
     p = p + np.random.default_rng(6).normal(0, SIGMA_M, p.shape)
     columns = dict(zip(("px_m", "py_m", "pz_m"), p.T.tolist(), strict=True))

@@ -24,7 +24,7 @@ TODAY_NS = 1_763_822_000_123_456_789  # a double has no such nanoseconds
 
 
 def options_of(folder: Path, drive: Recording, *without: str) -> list[Any]:
-    """Of `convert csv`, without some of the files."""
+    """Returns the options of `convert csv`, without some of the files."""
     words = csv_files(folder, drive)
     pairs = zip(words[::2], words[1::2], strict=True)
     return [word for name, path in pairs if name not in without for word in (name, path)]

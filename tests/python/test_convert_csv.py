@@ -82,7 +82,7 @@ def refusal_of_twists(folder: Path, pelorus: Run, change: tuple[str, str]) -> st
 
 
 def sources_in(folder: Path) -> csv_converter.Sources:
-    """Of the files that `csv_files` wrote."""
+    """Returns the files that `csv_files` wrote."""
     return csv_converter.Sources(
         csv_converter.MotionFiles(folder / "twists.csv"),
         folder / "stereo.csv",

@@ -74,7 +74,7 @@ def write_imu(folder: Path, T_BI: Poses) -> None:
 
 
 def write_truth(folder: Path, T_BI: Poses) -> None:
-    """Of the folder's body, between the frames: 30 ms before and behind each."""
+    """Writes poses of the folder's body between the frames: 30 ms before and after each."""
     folder.mkdir(parents=True)
     of_imu = Scene().body()
     T_IB = se3.inverse(T_BI)

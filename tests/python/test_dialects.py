@@ -226,7 +226,9 @@ def test_a_truth_that_would_fit_otherwise_is_asked_about(
 ) -> None:
     mine, theirs = noisy(way()), wrong(way())
     mine.p[:, 0] += np.linspace(0, drift_m, COUNT)
-    found = misread.doubts(misread.Named("mine", mine), misread.Named("theirs", theirs), True)
+    found = misread.doubts(
+        misread.NamedPoses("mine", mine), misread.NamedPoses("theirs", theirs), True
+    )
     assert len(found) == 1
     assert asked in found[0]
 
@@ -257,4 +259,4 @@ def test_where_nothing_else_would_fit_nothing_is_asked(other: Callable[[Poses], 
     """Right; a little longer; of another drive; standing; too short; turned by 4 degrees."""
     theirs = other(way())
     mine = noisy(way()).at(slice(0, len(theirs.p)))
-    assert not misread.doubts(misread.Named("a", mine), misread.Named("b", theirs), False)
+    assert not misread.doubts(misread.NamedPoses("a", mine), misread.NamedPoses("b", theirs), False)

@@ -24,13 +24,13 @@ from pelorus.errors import PelorusError
 from pelorus.evidence import Evidence
 from pelorus.explain import Explanation, explain
 from pelorus.explain.explanation import LINES
-from pelorus.explain.finding import Cause
+from pelorus.explain.incident import Cause
 from pelorus.explain.log import runs
 from pelorus.frames import Header, Message, Pose, Report, Stereo, Twist
 from pelorus.frames import Imu as ImuReadings
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
@@ -49,7 +49,7 @@ LATE = schema.number("status", "LATE")
 def simulated(by_imu: bool = False, **mishaps: Any) -> list[Message]:
     options = replace(DRIVE, mishaps=Mishaps(**mishaps))
     if by_imu:
-        options = replace(options, imu=Imu(imu_rate_hz=200))
+        options = replace(options, imu=SimulatedImu(imu_rate_hz=200))
     return list(simulate(options).recording.messages())
 
 
@@ -89,7 +89,7 @@ def test_the_first_cause_of_an_event_is_named_with_its_time(
     assert changed is not None
     found = explained(changed, tmp_path).first
     assert found is not None
-    assert found.cause in event.told
+    assert found.cause in event.causes
     assert abs(found.from_ns - t) <= WITHIN_S * S
 
 

@@ -136,7 +136,7 @@ def test_without_a_turn_the_lever_is_left_and_that_is_said() -> None:
     assert not finding.found
     assert mended is recording
     assert finding.action == "left as given"
-    assert not finding.told
+    assert not finding.is_conclusive
 
 
 def test_all_faults_at_once_are_mended_in_turn() -> None:

@@ -32,7 +32,7 @@ SLIPPED_S = 8.0
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a drive that slips."""
+    """Returns the log of a drive that slips."""
     folder = tmp_path_factory.mktemp("footage")
     mishaps = Mishaps(slip=0.5, slip_span=Span(SLIPPED_S, 3.0))
     recording = simulate(Options(seed=4, duration_s=14.0, mishaps=mishaps)).recording

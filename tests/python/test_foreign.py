@@ -183,7 +183,7 @@ def test_another_version_of_mat_is_told(tmp_path: Path) -> None:
     savemat(path, {"a": np.ones((20, 20))}, format="4")
     assert "not that of a MATLAB file of version 5 to 7" in refused(path, foreign.mat).wrong
     path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(384) + b"\x89HDF\r\n")
-    assert "save it with -v7" in refused(path, foreign.mat).due
+    assert "save it with -v7" in refused(path, foreign.mat).expected
 
 
 @pytest.mark.parametrize("read", [foreign.npz, foreign.mat])
@@ -212,7 +212,7 @@ def test_a_text_beyond_the_limit_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "long.txt"
     path.write_text("0123456789")
     assert foreign.text(path, 10) == "0123456789"
-    assert "at most 9 bytes" in refused(path, lambda p: foreign.text(p, 9)).due
+    assert "at most 9 bytes" in refused(path, lambda p: foreign.text(p, 9)).expected
     endless = Path("/dev/zero")
     if endless.exists():
         assert "is too long" in refused(endless, lambda p: foreign.text(p, 1 << 22)).wrong
@@ -222,7 +222,7 @@ def test_a_byte_that_is_no_text_is_told_with_its_place(tmp_path: Path) -> None:
     path = tmp_path / "latin.csv"
     path.write_bytes("t_s,größe\n".encode("latin-1"))
     error = refused(path, foreign.csv_rows)
-    assert (error.at, error.wrong, error.due) == (
+    assert (error.at, error.wrong, error.expected) == (
         "byte 6",
         "is no text",
         "text in UTF-8 is expected",

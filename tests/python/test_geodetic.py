@@ -42,7 +42,7 @@ def centred(lat: Floats, lon: Floats, h: Floats) -> Floats:
 
 
 def east_north_up(lat: Floats, lon: Floats, h: Floats) -> Floats:
-    """Of the first one."""
+    """Returns metres east, north and up of the first place."""
     f, g = np.radians(lat[0]), np.radians(lon[0])
     axes = [
         [-np.sin(g), np.cos(g), 0],
@@ -54,7 +54,7 @@ def east_north_up(lat: Floats, lon: Floats, h: Floats) -> Floats:
 
 
 def meridian_m(lat: float) -> float:
-    """Of the equator, by Simpson's rule."""
+    """Returns the distance from the equator, by Simpson's rule."""
     f = np.linspace(0, np.radians(lat), 20001)
     own = A * (1 - E2) / (1 - E2 * np.sin(f) ** 2) ** 1.5
     weights = np.ones(len(f))
@@ -204,7 +204,7 @@ def test_the_heading_at_the_start_is_found_by_the_way_and_the_filter_takes_posit
 ) -> None:
     drive, truth = on_earth(clean(seed=5, duration_s=40.0), yaw, 0.4, F)
     made, finding = earth_start.started(replace(drive, truth_t_ns=drive.truth_t_ns[:0]))
-    assert finding.told
+    assert finding.is_conclusive
     assert made.start is not None
     off = truth.R[0].T @ made.start.R_WB
     assert np.linalg.norm(Rotation.from_matrix(off).as_rotvec()) < 0.1
@@ -219,5 +219,5 @@ def test_a_heading_that_the_way_does_not_tell_is_said() -> None:
     drive, _ = on_earth(clean(**SHORT), 1.0, 50.0, np.eye(3))
     made, finding = earth_start.started(drive)
     assert made.start is None
-    assert not finding.told
+    assert not finding.is_conclusive
     assert "the way is too short: it is known to" in finding.evidence

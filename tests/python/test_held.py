@@ -187,27 +187,29 @@ def test_all_noises_are_made_larger_alike() -> None:
 def test_priors_of_biases_that_allow_what_drifting_tracks_tell_stay(
     monkeypatch: pytest.MonkeyPatch, given: dict[str, str], size: float, changed: dict[str, str]
 ) -> None:
-    told = {"bias-gyro-sigma": biases.Told(size, 1e-4)}
+    told = {"bias-gyro-sigma": biases.CommonBias(size, 1e-4)}
     monkeypatch.setattr(biases, "_halves", lambda *_: told)
     for frames, expected in ((200, given | changed), (199, given)):
         examined = SimpleNamespace(frame_t_ns=np.arange(frames) * 100_000_000)
         bench = SimpleNamespace(examined=examined, header=header())
-        settings, _ = biases.told_in_drift(cast(Any, bench), given, {})
+        settings, _ = biases.gyro_bias_in_drift(cast(Any, bench), given, {})
         assert settings == expected
 
 
 def test_a_bias_that_a_bent_picture_may_be_is_not_switched_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(biases, "_halves", lambda *_: {"bias-gyro-sigma": biases.Told(0.002, 1e-4)})
+    monkeypatch.setattr(
+        biases, "_halves", lambda *_: {"bias-gyro-sigma": biases.CommonBias(0.002, 1e-4)}
+    )
     examined = SimpleNamespace(frame_t_ns=np.arange(200) * 100_000_000)
     bench = SimpleNamespace(examined=examined, header=header())
     turns_px = 0.002 * header().camera.fx_px * 0.1
     off = {"bias": "off"}
-    bent, words = biases.told_in_drift(cast(Any, bench), off, {}, 1.1 * turns_px)
+    bent, words = biases.gyro_bias_in_drift(cast(Any, bench), off, {}, 1.1 * turns_px)
     assert bent == off
     assert "rectification" in words
-    flat, _ = biases.told_in_drift(cast(Any, bench), off, {}, 0.9 * turns_px)
+    flat, _ = biases.gyro_bias_in_drift(cast(Any, bench), off, {}, 0.9 * turns_px)
     assert flat["bias"] == "on"
 
 
@@ -229,6 +231,6 @@ def test_a_filter_that_doubts_most_of_the_time_is_not_to_be_trusted(
 ) -> None:
     bad = Report(0, Kind.STEREO, health=1, reasons=number("reason", why))
     line = TimeLine(100, {HEALTHS[0]: good, HEALTHS[1]: 100 - good}, ())
-    run = verdict.Run([bad] * (100 - good), cast(FrameTable, None), line)
+    run = verdict.JudgedRun([bad] * (100 - good), cast(FrameTable, None), line)
     (remark,) = verdict._health(run)
     assert remark.grade is grade

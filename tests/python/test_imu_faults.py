@@ -125,7 +125,7 @@ def test_the_converter_says_what_is_wrong(tmp_path: Path, pelorus: Run) -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_axes_that_tell_nothing_are_held_against_without_a_scale() -> None:
-    """Of a gyro of zeros: the likelihood ratio that is told was NaN."""
+    """With a gyro of zeros the likelihood ratio was NaN."""
     measured = Matrix(np.zeros((3, 3)), np.eye(9) * 1e-4, np.eye(9) * 1e-6)
     assert measured.held_against(np.zeros((3, 3))) == 0.0
     assert measured.held_against(np.eye(3)) > 0.0

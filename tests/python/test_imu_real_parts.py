@@ -56,7 +56,7 @@ def demand_a_start(found: list[Report], seconds: float) -> None:
     assert (waits[-1].t_ns - found[0].t_ns) * 1e-9 < seconds
     assert not any(m.reasons & (IMU_FAULT | OFF) for m in found)
     assert line.summary().startswith(f"good in {line.frames - 1} of {line.frames} frames"), (
-        line.told(0)
+        line.lines(0)
     )
 
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from draws import draws
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -19,7 +20,7 @@ def built(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PELORUS_BIN", str(BIN))
 
 
-@pytest.mark.parametrize("words", [[], ["--imu", "--runs", "30"]])
+@pytest.mark.parametrize("words", draws([["--imu", "--runs", "30"], []]))
 def test_the_error_of_many_runs_is_as_large_as_the_filter_says(words: list[str]) -> None:
     command = [sys.executable, str(SCRIPT), *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -8,9 +8,9 @@ import pytest
 from imu_drives import options
 from pelorus import inertial, se3
 from pelorus.frames import IMU_READINGS_MAX, Imu
-from pelorus.inertial import Inertial, Moving
+from pelorus.inertial import Inertial, MotionState
 from pelorus.motion import Times
-from pelorus.simulation.imu import Imu as Sensor
+from pelorus.simulation.imu import SimulatedImu as Sensor
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import simulate
 from scipy.linalg import expm
@@ -32,7 +32,7 @@ def test_a_step_is_exact_for_a_constant_reading(size: float) -> None:
     generator = np.zeros((5, 5))  # of [R, v_W, p; 0, 1, tau; 0, 0, 1] in a falling frame
     generator[:3, :3], generator[:3, 3], generator[3, 4] = se3.skew(w), a, 1.0
     moved = expm(generator)
-    found = inertial.step(Moving(R, p, R.T @ v_W), np.array(1.0), a, w, G)
+    found = inertial.step(MotionState(R, p, R.T @ v_W), np.array(1.0), a, w, G)
     assert np.allclose(found.R, R @ moved[:3, :3], atol=1e-13)
     assert np.allclose(found.R @ found.v_B, v_W + R @ moved[:3, 3] + G, atol=1e-12)
     assert np.allclose(found.p, p + v_W + 0.5 * G + R @ moved[:3, 4], atol=1e-12)
@@ -49,7 +49,7 @@ def test_perfect_readings_lead_along_the_truth_better_by_the_square_of_the_rate(
         imu = Sensor(rate, *(0.0,) * 5, rest_s=rest)
         drive = simulate(options(imu, stop=stop)).recording
         assert drive.truth_velocity is not None
-        first = Moving(drive.truth.R[0], drive.truth.p[0], drive.truth_velocity[0])
+        first = MotionState(drive.truth.R[0], drive.truth.p[0], drive.truth_velocity[0])
         path = inertial.path(drive.inertial, first, 9.81)
         at = np.searchsorted(drive.inertial.t_ns, drive.truth_t_ns)
         assert np.abs(path.R[at] - drive.truth.R).max() < 3e-6
@@ -63,7 +63,7 @@ def test_stretches_that_cut_intervals_are_interpolated() -> None:
     """Frames between readings: coasting from frame to frame is as good as reading by reading."""
     drive = simulate(options(exact(333.0))).recording
     assert drive.truth_velocity is not None
-    starts = Moving(drive.truth.R[:-1], drive.truth.p[:-1], drive.truth_velocity[:-1])
+    starts = MotionState(drive.truth.R[:-1], drive.truth.p[:-1], drive.truth_velocity[:-1])
     t_ns = drive.truth_t_ns
     found = inertial.coasted(drive.inertial, t_ns[:-1], t_ns[1:], starts, 9.81)
     assert np.abs(found.p - drive.truth.p[1:]).max() < 1e-6

@@ -27,7 +27,7 @@ from pelorus.online.diagnosis import Level, Status
 from pelorus.recording import Recording
 from pelorus.rig.read import Calibrated
 from pelorus.se3 import Poses
-from pelorus.simulation.imu import Imu as SimulatedImu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import messages_of
 from rendered import SMALL
@@ -137,6 +137,7 @@ def test_a_camera_that_looks_down_gives_a_base_that_does_not() -> None:
 def test_ctrl_c_ends_it_in_order_with_a_whole_log(
     recording: Recording, steps: list[Measured], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    before = signal.getsignal(signal.SIGINT)
     half = len(steps) * 3 // 4
     interrupt: list[Step] = [lambda: os.kill(os.getpid(), signal.SIGINT)]
     used = plugged_in(monkeypatch, camera(recording, [*steps[:half], *interrupt, *steps[half:]]))
@@ -147,7 +148,7 @@ def test_ctrl_c_ends_it_in_order_with_a_whole_log(
     kept = [m for m in messages_of(log) if isinstance(m, Stereo)]
     assert len(kept) == sum(isinstance(one, Stereo) for one in steps[:half])
     assert same_bits(log)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_a_camera_that_dies_is_told_and_nothing_that_was_kept_is_lost(

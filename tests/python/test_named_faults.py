@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from converted import Converted, Run
+from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import ALIKE, OF_RECORDINGS, found_in, of_times, piece
@@ -41,7 +42,8 @@ def test_a_clean_recording_has_no_faults(simulated: Recording) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "strength"), [(n, k) for n in OF_RECORDINGS for k in range(1 if n in ALIKE else 3)]
+    ("name", "strength"),
+    [(n, k) for n in OF_RECORDINGS for k in draws(range(1 if n in ALIKE else 3))],
 )
 def test_a_fault_is_named(simulated: Recording, name: str, strength: int) -> None:
     change, due = OF_RECORDINGS[name]
@@ -112,7 +114,7 @@ def test_a_scene_that_moves_is_told_before_no_fit() -> None:
 
 
 def test_what_moves_fast_is_no_slot() -> None:
-    """Of a rover: 342 tracks seemed to go on with another point."""
+    """On a rover 342 tracks seemed to continue with another point."""
     change, due = OF_RECORDINGS["moving"]
     assert found_in(change(everyday_drive(drawn(9702), 9702), 2))[0].name in due
 
@@ -135,7 +137,7 @@ def test_of_few_points_a_long_drive_is_looked_at() -> None:
 
 
 def test_degrees_that_go_round_between_two_frames_are_degrees() -> None:
-    """Of a drone: 46 rad/s. A lever made them a scale of the velocities, and km/h."""
+    """A drone with 46 rad/s: a lever made the degrees a scale of the velocities, and km/h."""
     change, _ = OF_RECORDINGS["degrees"]
     said = found_in(change(everyday_drive(drawn(7004), 7004), 0))
     assert [fault.name for fault in said] == ["unit-degrees"]
@@ -158,7 +160,7 @@ def test_points_that_come_back_elsewhere_are_slots_beyond_chance(
     assert Jumps(1, 75, again, elsewhere).are_slots == slots
 
 
-@pytest.mark.parametrize("strength", range(3))
+@pytest.mark.parametrize("strength", draws(range(3)))
 @pytest.mark.parametrize("name", ["time-unit", "time-order", "time-gap"])
 def test_a_fault_of_the_clock_is_named(name: str, strength: int) -> None:
     messages = of_times(drive(60), strength, name)

@@ -18,12 +18,12 @@ from pelorus.check import verdict
 from pelorus.check.known import Known
 from pelorus.check.verdict import Grade
 from pelorus.explain import explain
-from pelorus.explain.finding import Cause
+from pelorus.explain.incident import Cause
 from pelorus.frames import Kind, Message, Report, Text, Truth
 from pelorus.health import SHORT, time_line
 from pelorus.replay import replayed
 from pelorus.report.curves import Curves
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
@@ -135,7 +135,7 @@ def test_what_the_recording_says_of_itself_is_told(clean: list[Message]) -> None
 
 
 def test_frames_before_an_imu_has_started_are_not_drawn_as_lost() -> None:
-    log = log_of(recorded(replace(DRIVE, duration_s=6.0, imu=Imu(imu_rate_hz=200))))
+    log = log_of(recorded(replace(DRIVE, duration_s=6.0, imu=SimulatedImu(imu_rate_hz=200))))
     waiting = schema.number("reason", "NOT_STARTED")
     log = [
         replace(m, reasons=waiting, health=2)
@@ -158,10 +158,10 @@ def test_frames_before_an_imu_has_started_are_not_drawn_as_lost() -> None:
 
 
 def graded(log: list[Message], words: str) -> Grade:
-    """Of the one remark with these words, whatever the recording itself tells."""
+    """Returns the grade of the one remark with these words, whatever the recording itself shows."""
     (remark,) = [
         remark
-        for remark in verdict.verdict_of(verdict.Run.of(log), Known()).remarks
+        for remark in verdict.verdict_of(verdict.JudgedRun.of(log), Known()).remarks
         if words in remark.text
     ]
     return remark.grade

@@ -17,7 +17,7 @@ from pelorus.online.order import ClockStep, Datum, Sequencer
 from pelorus.online.pairs import Joining, Pairing
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.simulation.imu import Imu as SimulatedImu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import messages_of
 from replay_drive import BIN

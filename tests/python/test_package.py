@@ -106,7 +106,7 @@ def test_what_needs_an_extra_names_it(extra: str, code: str) -> None:
 
 
 def installed_bytes(requirements: Iterable[str], seen: set[str]) -> int:
-    """Of the files of all that these need, by this environment's versions of them."""
+    """Returns the bytes of all files that these need, by this environment's versions."""
     total = 0
     for requirement in map(Requirement, requirements):
         wanted = requirement.marker is None or requirement.marker.evaluate({"extra": ""})

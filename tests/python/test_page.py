@@ -25,7 +25,7 @@ from pelorus.layout import unpack_symmetric
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.report.packed import Packer
-from pelorus.report.page import Answer, Table
+from pelorus.report.page import Answer, PageTable
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
@@ -40,7 +40,7 @@ SLIPPED_S = 12.0
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> list[Message]:
-    """Of a drive that slips."""
+    """Returns the log of a drive that slips."""
     folder = tmp_path_factory.mktemp("page")
     mishaps = Mishaps(slip=0.5, slip_span=Span(SLIPPED_S, 3.0))
     recording = simulate(Options(seed=4, duration_s=25.0, mishaps=mishaps)).recording
@@ -440,7 +440,12 @@ def test_tables_are_whole_on_a_phone(browser: Tab, tmp_path: Path) -> None:
     rows = [[f"column {k} m" for k in range(9)], *([f"{row}.1234"] * 9 for row in range(3))]
     page.write(
         path,
-        Answer("t", "good", "", tables=[Table("few", [r[:5] for r in rows]), Table("many", rows)]),
+        Answer(
+            "t",
+            "good",
+            "",
+            tables=[PageTable("few", [r[:5] for r in rows]), PageTable("many", rows)],
+        ),
     )
     browser.open(path, 390)
     widths = "[...document.querySelectorAll('.wide')].map((w) => w.scrollWidth - w.clientWidth)"

@@ -53,7 +53,7 @@ def fence(left: Gray, right: Gray) -> Pair:
 
 
 def dim(left: Gray, right: Gray) -> Pair:
-    """Of a poor sensor, the right one darker."""
+    """Returns the pair as a poor sensor sees it, the right picture darker."""
     chance = np.random.default_rng(int(left.sum()))
     shades = left.astype(float), 40 + 0.6 * right.astype(float)
     one, other = (np.clip(s + chance.normal(0, 11, s.shape), 0, 255) for s in shades)

@@ -128,7 +128,7 @@ def test_a_log_replays_to_the_same_bits_with_its_own_settings(
 def test_a_log_of_another_build_says_that_the_bits_may_differ(
     record: Record, tmp_path: Path
 ) -> None:
-    """Of another capacity they are the same as a rule, of another precision they are not."""
+    """With another capacity the bits are normally the same, with another precision they are not."""
     log = tmp_path / "1.plr"
     run(record(drive()), "--out", log, "--quiet")
     assert "another build" not in run(log).stderr

@@ -28,7 +28,7 @@ def begun(folder: Path, *before: str) -> subprocess.Popen[bytes]:
         "--trajectory",
         str(folder / "t.tum"),
     )
-    first = ("env", "--default-signal=HUP,INT")  # the tests may run under nohup themselves
+    first = ("env", "--default-signal")  # the tests may run under nohup themselves
     replay = subprocess.Popen([*first, *before, str(program), "-", *outputs], stdin=subprocess.PIPE)
     assert replay.stdin
     replay.stdin.write(encode(drive())[:-400])

@@ -58,7 +58,7 @@ def saved(record: Record, kept: Path, *options: str, program: str = "pelorus-rep
 
 
 def statuses(path: Path) -> list[int]:
-    """Of the answers to STATE in a log."""
+    """Returns the statuses of the answers to STATE in a log."""
     reports = [m for m in log_of(path) if isinstance(m, Report) and m.subject == Kind.STATE]
     return [report.status for report in reports]
 

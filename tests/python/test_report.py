@@ -187,7 +187,7 @@ def test_world_has_a_depth_limit(
 
 
 def titles(said: str) -> list[str]:
-    """Of the runs' table, which stands below the verdict."""
+    """Returns the titles of the runs' table, which is below the verdict."""
     return next(line for line in said.splitlines() if line.split()[:1] == ["yours"]).split()
 
 

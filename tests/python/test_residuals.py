@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus.explain.log import Log, log_of
+from pelorus.explain.log import FilterLog, log_of
 from pelorus.layout import Floats
 from pelorus.replay import replayed
 from pelorus.report.drawings import plot
 from pelorus.report.residuals import Residuals, residuals, residuals_of
 from pelorus.report.spectra import drawings
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
 from report_runs import built_programs
 
 
-def log_with(**options: Any) -> Log:
+def log_with(**options: Any) -> FilterLog:
     drive = Options(seed=41, duration_s=15.0, lap_s=12.0, **options)
     messages = list(simulate(drive).recording.messages())
     return log_of(replayed(built_programs().float32, messages, []))
@@ -50,7 +50,7 @@ def test_the_first_frames_have_none() -> None:
 
 
 def test_an_imus_log_has_spectra_and_residuals_of_both_pictures() -> None:
-    made = {one.title: one for one in drawings(log_with(imu=Imu(imu_rate_hz=100)))}
+    made = {one.title: one for one in drawings(log_with(imu=SimulatedImu(imu_rate_hz=100)))}
     assert {"Vibration: specific force", "Vibration: turn rate", "Residuals"} < set(made)
     assert {"Residuals over the left picture", "Residuals over the right picture"} < set(made)
     assert all(one.svg.startswith("<svg") and "nan" not in one.svg for one in made.values())

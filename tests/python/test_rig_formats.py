@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pelorus import se3
-from pelorus.converters.streams import Seen, Streams, Twists, recording
+from pelorus.converters.streams import RawTracks, Streams, Twists, recording
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.rig import read as rig_files
@@ -260,7 +260,7 @@ def opencv_xml(cameras: Cameras, folder: Path) -> list[Path]:
 
 
 def zed(cameras: Cameras, folder: Path) -> list[Path]:
-    """Of three resolutions, the one of the pictures in the middle."""
+    """Writes three resolutions, the pictures' one in the middle."""
     rx, cv, rz = Rotation.from_matrix(cameras.T_RL.R).as_rotvec()
     baseline, ty, tz = -1e3 * cameras.T_RL.p
     text = ""
@@ -323,13 +323,13 @@ def test_tracks_are_of_the_resolution_that_holds_their_pixels(tmp_path: Path) ->
     calibrated = rig_files.of_rig(rig, "x")
     t_ns = np.array([10**9])
     twists = Twists(Path("t"), np.array([0, 2 * 10**9]), *np.zeros((2, 2, 3)))
-    made = recording(Streams(calibrated, Seen(Path("s"), t_ns, tracks), twists))
+    made = recording(Streams(calibrated, RawTracks(Path("s"), t_ns, tracks), twists))
     s_B = se3.apply(se3.inverse(cameras.T_LB), q_L)
     due = project(made.header.camera, se3.apply(made.T_CB, s_B))
     assert np.abs(made.tracks.pixels - due).max() < 1e-3
     beyond = replace(tracks, pixels=tracks.pixels + 3000)
     with pytest.raises(ForeignFileError, match="beyond every resolution"):
-        recording(Streams(calibrated, Seen(Path("s"), t_ns, beyond), twists))
+        recording(Streams(calibrated, RawTracks(Path("s"), t_ns, beyond), twists))
 
 
 def rectified(cameras: Cameras, folder: Path, before: bool) -> list[Path]:

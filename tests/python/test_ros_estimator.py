@@ -16,7 +16,7 @@ from pelorus.cli import main
 from pelorus.errors import PelorusError
 from pelorus.frames import Imu, Message, Stereo
 from pelorus.online.diagnosis import Level, of_health
-from pelorus.simulation.imu import Imu as SimulatedImu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options as Drive
 from pelorus.simulation.simulate import simulate
 from pelorus_ros.estimator import Estimator

@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from converted import Run
+from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from pelorus.check import clock, scale, search, tuning, verdict
@@ -61,7 +62,9 @@ def test_what_a_scale_explains_is_no_clock(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(clock, "of_twists", of_twists)
     monkeypatch.setattr(clock, "seconds", lambda _: 0.02)
-    monkeypatch.setattr(tuning, "search_noises", lambda *_: search.Found({"pixel": 0.5}, NOTHING))
+    monkeypatch.setattr(
+        tuning, "search_noises", lambda *_: search.BestFound({"pixel": 0.5}, NOTHING)
+    )
     examined = SimpleNamespace(twist_t_ns=[])
     bench = cast(Any, SimpleNamespace(header=header(), examined=examined))
     invented, _, _ = tuning.clocked(bench, {}, {"pixel": 0.5}, {})
@@ -74,14 +77,14 @@ def test_what_a_scale_explains_is_no_clock(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize("one_clock", [True, False])
 def test_two_clocks_are_no_timing(monkeypatch: pytest.MonkeyPatch, one_clock: bool) -> None:
     """Starry Night's gyro is late beside its velocities; `end` is likelier, and the worse."""
-    found = search.Found({"pixel": 0.5, "velocity": 0.1, "gyro": 0.01}, NOTHING)
+    found = search.BestFound({"pixel": 0.5, "velocity": 0.1, "gyro": 0.01}, NOTHING)
     monkeypatch.setattr(clock, "of_twists", lambda *_: clock.Offset(0.06, 0.001))
     monkeypatch.setattr(clock, "seconds", lambda _: 0.02)
     monkeypatch.setattr(scale, "off_by", lambda *_: 0.0)
     monkeypatch.setattr(tuning, "search_noises", lambda *_: found)
     monkeypatch.setattr(tuning, "track_noise", lambda _: SimpleNamespace(drifts=False))
     monkeypatch.setattr(tuning, "difference_of_a_reading", lambda *_: None)
-    monkeypatch.setattr(tuning, "told_by_halves", lambda _, fixed, __: (fixed, "no bias"))
+    monkeypatch.setattr(tuning, "biases_by_halves", lambda _, fixed, __: (fixed, "no bias"))
     monkeypatch.setattr(tuning, "_axes", lambda *_: (found, "one sigma for all axes"))
     bench = SimpleNamespace(
         by_imu=False,
@@ -119,12 +122,14 @@ WALK = replace(
 
 @pytest.mark.parametrize(
     ("speed_varies", "bias_mps", "error", "grade", "words"),
-    [
-        (0.0, 0.05, 0.02, "care", "cannot tell the scale of the stereo pair from a bias"),
-        (0.3, 0.0, 0.02, "care", "baseline, focal length or wheels' radius"),
-        (0.3, 0.0, 0.0, "good", ""),
-    ],
-    ids=["hidden by a bias", "told", "right"],
+    draws(
+        [
+            (0.0, 0.05, 0.02, "care", "cannot tell the scale of the stereo pair from a bias"),
+            (0.3, 0.0, 0.02, "care", "baseline, focal length or wheels' radius"),
+            (0.3, 0.0, 0.0, "good", ""),
+        ]
+    ),
+    ids=draws(["hidden by a bias", "told", "right"]),
 )
 def test_a_verdict_is_no_better_than_what_the_drive_tells_of_the_scale(
     speed_varies: float,

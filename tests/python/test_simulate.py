@@ -16,7 +16,7 @@ from pelorus.errors import PelorusError
 from pelorus.frames import Header, Kind, Landmark, Role, Stereo, TwistTiming
 from pelorus.layout import Floats
 from pelorus.simulation import drive, scene
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, Simulation, simulate
 from pelorus.tracks import project
 from scipy.linalg import expm
@@ -234,7 +234,7 @@ def test_frames_before_the_readings_of_an_imu_stand_on_its_way(
     pelorus("simulate", target, *options)
     frames = [message.t_ns for message in messages_of(target, Stereo)]
     assert frames[:3] == [0, 99_000_000, 199_000_000]
-    drive_of = Options(imu=Imu(imu_rate_hz=200), duration_s=4)
+    drive_of = Options(imu=SimulatedImu(imu_rate_hz=200), duration_s=4)
     there, before = (
         simulate(replace(drive_of, frame_lead_ns=lead)).recording for lead in (0, 1_000_000)
     )

@@ -18,11 +18,15 @@ from typing import Any
 
 import pytest
 from chromium import Tab, chromium, tab
+from draws import long_run
 from pelorus.cli import main
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium")
+pytestmark = [
+    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+    long_run,  # zig builds two programs of WebAssembly
+]
 PATIENCE_S = 120.0
 
 

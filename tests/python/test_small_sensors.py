@@ -16,7 +16,7 @@ from drives import PERFECT, clean
 from pelorus.frames import Reading
 from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.readings import Sensing
 from pelorus.simulation.settings import Span
@@ -358,13 +358,13 @@ def test_no_batch_of_an_imu_reaches_beyond_a_reading_beside_it(
     tmp_path: Path, sensing: dict[str, Sensing]
 ) -> None:
     path = tmp_path / "imu.plr"
-    options = Options(duration_s=20.0, imu=Imu(imu_rate_hz=200.0), readings=sensing)
+    options = Options(duration_s=20.0, imu=SimulatedImu(imu_rate_hz=200.0), readings=sensing)
     simulate(options).recording.write(path)
     assert used_of_all(path) > 0
 
 
 def test_an_imu_and_wheels_of_two_csv_files_are_both_taken(tmp_path: Path, pelorus: Run) -> None:
-    imu = Imu(imu_rate_hz=200.0, rest_s=1.5)
+    imu = SimulatedImu(imu_rate_hz=200.0, rest_s=1.5)
     drive = simulate(Options(duration_s=20.0, imu=imu, pixel_sigma_px=0.5)).recording
     files = csv_files(tmp_path, drive)[2:]  # all but the twists
     files += ["--imu", imu_csv(tmp_path, drive)]

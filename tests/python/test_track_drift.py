@@ -83,7 +83,7 @@ def test_a_patch_that_has_doubled_is_cut_anew_and_others_are_kept() -> None:
 
 
 def wander_px(settings: Settings) -> tuple[float, float]:
-    """Of tracks on a wall ahead: median distance from the point of their birth, young and old."""
+    """Returns the median distance of tracks on a wall ahead from their birth, young and old."""
     source = texture(5)
     ways = [about_middle(AHEAD**k, TURN_DEG * k) for k in range(FRAMES)]
     shifted = [about_middle(AHEAD**k, TURN_DEG * k, DISPARITY_PX) for k in range(FRAMES)]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imu_drives import noisy
-from pelorus.converters.streams import Pictures, Readings, Seen, Streams, recording
+from pelorus.converters.streams import Pictures, RawTracks, Readings, Streams, recording
 from pelorus.errors import PelorusError
 from pelorus.recording import Recording
 from pelorus.rig.read import Calibrated
@@ -18,7 +18,7 @@ DAY_NS = 1_600_000_000 * 10**9
 
 
 def streams(drive: Recording, truth: Trajectory) -> Streams:
-    frames = Seen(Path("stereo.csv"), drive.frame_t_ns + DAY_NS, drive.tracks)
+    frames = RawTracks(Path("stereo.csv"), drive.frame_t_ns + DAY_NS, drive.tracks)
     inertial = drive.inertial._replace(t_ns=drive.inertial.t_ns + DAY_NS)
     motion = Readings(Path("imu.csv"), inertial)
     return Streams(Calibrated(drive.header), frames, motion, truth)
@@ -69,7 +69,7 @@ def test_a_filter_starts_from_a_truth_that_begins_before_the_first_frame(tmp_pat
         drive.tracks.id[kept],
         drive.tracks.pixels[kept],
     )
-    frames = Seen(Path("stereo.csv"), drive.frame_t_ns[later] + DAY_NS, tracks)
+    frames = RawTracks(Path("stereo.csv"), drive.frame_t_ns[later] + DAY_NS, tracks)
     made = recording(Streams(whole.calibrated, frames, whole.motion, whole.truth))
     assert made.truth_t_ns[0] == drive.inertial.t_ns[0] + DAY_NS + 12_000_000
     assert made.inertial.t_ns[0] >= made.truth_t_ns[0]

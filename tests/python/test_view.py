@@ -34,7 +34,7 @@ S = 1_000_000_000
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a drive whose wheels slip, with a name that nobody should trust."""
+    """Returns the log of a drive whose wheels slip, with a malicious name."""
     folder = tmp_path_factory.mktemp("view")
     mishaps = Mishaps(slip=0.5, slip_span=Span(12.0, 3.0))
     recording = simulate(Options(seed=4, duration_s=20.0, mishaps=mishaps)).recording

@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from draws import long_run
 from pelorus import __version__, native
 from PIL import Image
 
@@ -25,6 +26,7 @@ pytest.importorskip("scikit_build_core")
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 import wheels
 
+pytestmark = long_run  # zig builds the library for another system
 NATIVE = ("pelorus-filter.dll", "pelorus-filter-f64.dll")
 PROGRAMS = ("pelorus-replay.exe", "pelorus-replay-f64.exe")
 # Loads a library, looks for each name that follows, and says its version.

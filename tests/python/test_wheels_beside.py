@@ -19,7 +19,7 @@ from pelorus.frames import Header, Pose, Process, Reading, Twist
 from pelorus.layout import Floats, unpack_symmetric
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.readings import Sensing
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
@@ -75,7 +75,7 @@ def test_a_minute_in_the_dark_costs_a_percent_of_the_way_if_the_body_cannot_slid
 ) -> None:
     """At 1 m/s, with readings of 0 across the wheels; the IMU alone is tens of metres off."""
     wheel = Sensing(rate_hz=50.0, axes="xyz", sigma=(0.03, 0.05, 0.05))
-    imu = Imu(imu_rate_hz=200.0, rest_s=2.0)
+    imu = SimulatedImu(imu_rate_hz=200.0, rest_s=2.0)
     options = Options(seed=seed, duration_s=70.0, speed_mps=1.0, imu=imu, readings={"wheel": wheel})
     drive = simulate(options).recording
     t_s = (drive.frame_t_ns - drive.frame_t_ns[0]) / SECOND
@@ -113,7 +113,9 @@ def test_the_body_stands_while_all_wheels_read_zero() -> None:
 @pytest.fixture(scope="module")
 def drive() -> Recording:
     """Twenty seconds with an IMU, some of which the body stands."""
-    options = Options(duration_s=20.0, imu=Imu(imu_rate_hz=200.0, rest_s=1.5), stop=Span(8.0, 5.0))
+    options = Options(
+        duration_s=20.0, imu=SimulatedImu(imu_rate_hz=200.0, rest_s=1.5), stop=Span(8.0, 5.0)
+    )
     return simulate(options).recording
 
 

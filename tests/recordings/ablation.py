@@ -30,7 +30,7 @@ Outcomes = dict[str, tuple[bool, Phases]]
 
 
 def campaign(program: Path, seeds: int, without: str) -> Outcomes:
-    """Verdict, and for each phase GOOD, silent, error and own sigma."""
+    """Returns by scenario the verdict, and for each phase GOOD, silent, error and own sigma."""
     command = [str(program), "--seeds", str(seeds), "--jobs", "1", "--scenario", SCENARIOS]
     command += ["--policy", "own"]
     command += ["--without", without] if without else []
@@ -65,7 +65,7 @@ def _scenario_words(phases: Phases, others: Phases) -> list[str]:
 
 
 def scenario_changes(whole: Outcomes, without: Outcomes) -> list[str]:
-    """A phrase for each scenario that changes."""
+    """Returns a phrase for each scenario that changes."""
     said = []
     for name, (passed, phases) in whole.items():
         passes, others = without[name]
@@ -77,7 +77,7 @@ def scenario_changes(whole: Outcomes, without: Outcomes) -> list[str]:
 
 
 def recordings(program: Path, cache: Path, without: str) -> dict[str, Figures]:
-    """The figures of each recording but those of a simulator."""
+    """Returns the figures of each recording but those of a simulator."""
     found = {}
     for case in cases():
         if "tum" not in case.name and "udel" not in case.name:
@@ -87,7 +87,7 @@ def recordings(program: Path, cache: Path, without: str) -> dict[str, Figures]:
 
 
 def recording_changes(whole: dict[str, Figures], without: dict[str, Figures]) -> list[str]:
-    """A phrase for each recording that changes."""
+    """Returns a phrase for each recording that changes."""
     limits = {"ATE": (0.1, 0.0), "err0": (0.5, 0.0), "good": (0.0, 0.05), "silent": (0.0, 0.05)}
     said = []
     for name, f in whole.items():

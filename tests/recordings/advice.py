@@ -41,7 +41,7 @@ Defect = Callable[[Recording, Chance], Recording]
 
 
 def _lasting(count: int, columns: int, keeps: float, chance: Chance) -> Floats:
-    """Noise of variance 1 that keeps so much of itself from one row to the next."""
+    """Returns noise of variance 1 that keeps the share `keeps` from one row to the next."""
     out = chance.normal(size=(count, columns))
     for k in range(1, count):
         out[k] = keeps * out[k - 1] + np.sqrt(1 - keeps**2) * out[k]
@@ -54,7 +54,7 @@ def _with_pixels(drive: Recording, off: Floats) -> Recording:
 
 
 def _by_track(drive: Recording, of: Callable[[Floats], Floats]) -> Recording:
-    """`of`: what is added to the pixels of one track, from frame to frame."""
+    """Adds to the pixels of each track what `of` returns for its frames."""
     off = np.zeros_like(drive.tracks.pixels)
     for id in np.unique(drive.tracks.id):
         rows = np.nonzero(drive.tracks.id == id)[0]
@@ -63,28 +63,28 @@ def _by_track(drive: Recording, of: Callable[[Floats], Floats]) -> Recording:
 
 
 def none(drive: Recording, _: Chance) -> Recording:
-    """White noise all along."""
+    """Leaves the noise white."""
     return drive
 
 
 def drifting(drive: Recording, chance: Chance) -> Recording:
-    """A tracker's errors keep nine tenths from frame to frame."""
+    """Adds errors that keep nine tenths from frame to frame, like a drifting tracker's."""
     px = chance.uniform(0.5, 1.5)
     return _by_track(drive, lambda pixels: px * _lasting(len(pixels), 4, 0.9, chance))
 
 
 def lagging(drive: Recording, _: Chance) -> Recording:
-    """Matches are biased: a tenth of a point's way stays behind."""
+    """Biases matches: a tenth of a point's motion stays behind."""
     return _by_track(drive, lambda pixels: -0.1 * np.diff(pixels, axis=0, prepend=pixels[:1]))
 
 
 def heavy(drive: Recording, chance: Chance) -> Recording:
-    """Student's t with two degrees of freedom."""
+    """Adds noise of Student's t with two degrees of freedom."""
     return _with_pixels(drive, 0.5 * chance.standard_t(2, drive.tracks.pixels.shape))
 
 
 def bent(drive: Recording, chance: Chance) -> Recording:
-    """A lens: what a point is off by depends on where it is seen."""
+    """Adds a lens error, which depends on the place in the picture."""
     x, y = (drive.tracks.pixels[:, :2] / (376, 240) - 1).T
     off = np.zeros_like(drive.tracks.pixels)
     off[:, 2] = chance.uniform(0.3, 1.0) * (1.5 * x * y + 0.5 * x)
@@ -92,14 +92,14 @@ def bent(drive: Recording, chance: Chance) -> Recording:
 
 
 def wrong(drive: Recording, chance: Chance) -> Recording:
-    """One match in twenty is another point."""
+    """Makes one match in twenty another point."""
     off = chance.uniform(-40, 40, drive.tracks.pixels.shape) * [1, 0.05, 1, 0.05]
     off[chance.random(len(off)) > 0.05] = 0
     return _with_pixels(drive, off)
 
 
 def by_speed(drive: Recording, chance: Chance) -> Recording:
-    """Wheels: 2 % of scale, and slip of 3 % of the speed that lasts for a second."""
+    """Adds wheels' errors: 2 % of scale, and slip of 3 % of the speed that lasts for a second."""
     rate_hz = 1e9 / float(np.median(np.diff(drive.twist_t_ns)))
     slip = _lasting(len(drive.v_B_mps), 3, float(np.exp(-1 / rate_hz)), chance)
     speed = np.linalg.norm(drive.v_B_mps, axis=1, keepdims=True)
@@ -107,7 +107,7 @@ def by_speed(drive: Recording, chance: Chance) -> Recording:
 
 
 def wandering(drive: Recording, chance: Chance) -> Recording:
-    """A gyro whose bias walks, and velocities across the way that are off for seconds."""
+    """Adds a gyro bias that walks, and velocities across the way that are off for seconds."""
     rate_hz = 1e9 / float(np.median(np.diff(drive.twist_t_ns)))
     keeps = float(np.exp(-1 / (3 * rate_hz)))
     v = 0.1 * _lasting(len(drive.v_B_mps), 3, keeps, chance) * [0, 1, 1]
@@ -124,7 +124,7 @@ DEFECTS: tuple[Defect, ...] = (
 
 
 def simulated(count: int, first: int, folder: Path) -> Iterator[tuple[str, Path, Settings]]:
-    """Name, recording, settings."""
+    """Yields name, recording, settings of simulated drives."""
     for seed in range(first, first + count):
         chance = np.random.default_rng([seed, 3])
         defect = DEFECTS[seed % len(DEFECTS)]
@@ -139,7 +139,7 @@ def simulated(count: int, first: int, folder: Path) -> Iterator[tuple[str, Path,
 
 
 def reals(folder: Path) -> Iterator[tuple[str, Path, Settings]]:
-    """Name, recording, settings."""
+    """Yields name, recording, settings of real recordings."""
     for case in judge.cases():
         if not (judge.DATA / case.file).exists():
             continue

@@ -27,7 +27,7 @@ BY_IMU = ("IMU alone",)
 
 @dataclass(frozen=True)
 class Row:
-    """A line of a table: which figure is shown, and the options of the course's filter, if any."""
+    """A line of a table: its figure, and the options of the course's filter, if any."""
 
     case: Case
     figure: str
@@ -67,12 +67,12 @@ def by_imu() -> Iterator[Row]:
 
 
 def metres(value: float) -> str:
-    """With as many digits as mean something."""
+    """Returns a length with as many digits as are significant."""
     return "" if np.isnan(value) else f"{value:.{3 if value < 1 else 2 if value < 10 else 1}f} m"
 
 
 def path_m(recording: Path) -> str:
-    """How far the truth goes."""
+    """Returns the length of the true path."""
     truth = truth_in(messages_of(recording))
     if truth is None:
         return ""
@@ -80,7 +80,7 @@ def path_m(recording: Path) -> str:
 
 
 def by_course(program: Path, recording: Path, options: Sequence[str], figure: str) -> str:
-    """The course's figure, and its NEES/6; empty where it finds no way."""
+    """Returns the course's figure, and its NEES/6; empty where its filter fails."""
     try:
         found = figures(run(program, recording, ["--preset", "course", *options]))
     except subprocess.CalledProcessError:
@@ -89,7 +89,7 @@ def by_course(program: Path, recording: Path, options: Sequence[str], figure: st
 
 
 def cell(found: Figures, figure: str) -> str:
-    """The error, and NEES/6 if the truth is one of poses."""
+    """Returns the error, and NEES/6 if the truth has poses."""
     error = found.get("ATE" if figure == "road" else figure, np.nan)
     nees = found.get("NEES/6", np.nan)
     if np.isnan(nees):
@@ -98,7 +98,7 @@ def cell(found: Figures, figure: str) -> str:
 
 
 def line(row: Row, programs: Path, cache: Path, with_course: bool) -> str:
-    """Of the table."""
+    """Returns a line of the table."""
     recording = converted(row.case, cache)
     replay = programs / "pelorus-replay"
     ours = figures(run(replay, recording, row.case.options))

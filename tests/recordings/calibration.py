@@ -39,7 +39,7 @@ TURN_RAD = np.radians(0.3) / np.sqrt(3) * np.array([1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Wrong:
-    """What the HEADER says of focal length, baseline and T_CB, and the clock of the frames."""
+    """The HEADER's errors of focal length, baseline and T_CB, and that of the frames' clock."""
 
     focal: float = 0.0
     baseline: float = 0.0
@@ -65,8 +65,8 @@ class Wrong:
             return replace(message, t_ns=message.t_ns + round(self.late_s * 1e9))
         return message
 
-    def due(self) -> Floats:
-        """What the filter should correct: plr_calibration_error."""
+    def expected(self) -> Floats:
+        """Returns the corrections that are expected of the filter: plr_calibration_error."""
         out = np.zeros(len(PARTS))
         out[:2] = 1 / (1 + self.baseline) - 1, 1 / (1 + self.focal) - 1
         out[2:5] = -self.turned * TURN_RAD
@@ -92,9 +92,7 @@ COLUMNS = ("err0", "ratio", "NEES/6", "good", "focal", "baseline", "turn", "cloc
 
 
 def later_truth(messages: list[Message], late_s: float) -> list[Message]:
-    """The truth at the times that the frames now have: a walk between poses a tenth of a second
-    apart is no straight line.
-    """
+    """Returns the truth at the frames' new times: between poses the walk is no straight line."""
     truth = [m for m in messages if isinstance(m, Truth)]
     t_ns = np.array([m.t_ns for m in truth])
     seconds = (t_ns - t_ns[0]) * 1e-9
@@ -107,7 +105,7 @@ def later_truth(messages: list[Message], late_s: float) -> list[Message]:
 
 
 def spoiled(recording: Path, wrong: Wrong, folder: Path) -> Path:
-    """The recording with another HEADER and other times of its frames."""
+    """Returns the recording with another HEADER and other times of its frames."""
     out = folder / f"{recording.stem}-{abs(hash(wrong))}.plr"
     given = [m for m in messages_of(recording) if not isinstance(m, End)]
     messages = later_truth([wrong.message(m) for m in given], wrong.late_s)
@@ -117,7 +115,7 @@ def spoiled(recording: Path, wrong: Wrong, folder: Path) -> Path:
 
 
 def options_of(name: str, listed: str) -> list[str]:
-    """`known` is exact; all others have the same sigmas, estimated or considered."""
+    """Returns options: `known` is exact; others have the same sigmas, estimated or considered."""
     if name == "known":
         exact = [v for part in EXACT for v in (f"--{part}-sigma", "0")]
         return [*conf("imu"), "--calibrate", "off", *exact]
@@ -126,15 +124,17 @@ def options_of(name: str, listed: str) -> list[str]:
 
 
 def row_of(messages: list[Message], wrong: Wrong) -> list[float]:
-    """err0, NEES/6, rotation and its sigma, errors left of focal, baseline, turn and clock, and the
-    largest of all in its own sigmas.
+    """Returns err0, NEES/6, rotation and its sigma, and the errors of the calibration.
+
+    These are what is left of focal, baseline, turn and clock, and the largest of all in its own
+    sigmas.
     """
     found = figures(messages)
     row = [found["err0"], found["NEES/6"], found["good"]]
     told = last_calibrated(messages)
     if told is None:
         return row + [np.nan] * 5
-    error = told.corrected - wrong.due()
+    error = told.corrected - wrong.expected()
     bits = [bool(told.estimated >> k & 1) for k in range(len(PARTS))]
     left = np.where(bits, np.abs(error) * [part.scale for part in PARTS], np.nan)
     ratio = np.abs(error[bits]) / told.sigma[bits]

@@ -38,7 +38,7 @@ class Eye:
         self.header, self.truth = header, truth
 
     def pose(self, t_ns: int) -> tuple[Floats, Floats]:
-        """R_WC and p_WC of the left camera."""
+        """Returns R_WC and p_WC of the left camera."""
         at = self.truth[t_ns]
         R_WC = np.asarray(at.R_WB) @ np.asarray(self.header.R_CB).T
         return R_WC, np.asarray(at.p_WB_m) - R_WC @ np.asarray(self.header.t_CB_m)
@@ -56,7 +56,7 @@ class Eye:
         return np.stack([u, v, right, v], axis=1), np.stack(seen, axis=1)
 
     def lay(self, count: int, t_ns: int, rng: np.random.Generator) -> Floats:
-        """New points that the left camera sees, in the world."""
+        """Returns new points in the world that the left camera sees."""
         R, p = self.pose(t_ns)
         c, size = self.header.camera, (self.header.image_width_px, self.header.image_height_px)
         u, v = rng.uniform(0, size, (count, 2)).T
@@ -66,7 +66,7 @@ class Eye:
 
 
 def dense(recording: Path, seed: int, out: Path) -> None:
-    """The recording with another cloud."""
+    """Writes the recording with another cloud."""
     messages = [m for m in messages_of(recording) if not isinstance(m, End)]
     frames = [m.t_ns for m in messages if isinstance(m, Stereo)]
     frames = [t for t in frames if t <= frames[0] + SECONDS * 1e9]
@@ -93,7 +93,7 @@ def dense(recording: Path, seed: int, out: Path) -> None:
 
 
 def row_of(messages: list[Message]) -> list[float]:
-    """The columns of one drive."""
+    """Returns the columns of one drive."""
     found, truth = estimate_in(messages), truth_in(messages)
     assert found is not None
     assert truth is not None

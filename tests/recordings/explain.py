@@ -25,10 +25,10 @@ from injected_events import EVENTS, Event, Messages, S, moving
 from judge import DATA, cases, converted, parser_of, run
 from pelorus import schema
 from pelorus.explain import Explanation, explain
-from pelorus.explain.finding import Cause, Finding
+from pelorus.explain.incident import Cause, Incident
 from pelorus.frames import Kind, Process, Stereo
 from pelorus.health import GOOD
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import header_of_messages, messages_of, write_file
 
@@ -54,15 +54,15 @@ def simulated(seeds: range) -> Iterator[Drive]:
             ("slow", Options(seed=seed, speed_mps=1.0, lap_s=30)),
             ("fast", Options(seed=seed, speed_mps=8.0, range_m=60, velocity_sigma_mps=0.1)),
             ("20 Hz", Options(seed=seed, frame_rate_hz=20, observations=100)),
-            ("imu", Options(seed=seed, imu=Imu(imu_rate_hz=200))),
-            ("imu fast", Options(seed=seed, speed_mps=5.0, imu=Imu(imu_rate_hz=400))),
+            ("imu", Options(seed=seed, imu=SimulatedImu(imu_rate_hz=200))),
+            ("imu fast", Options(seed=seed, speed_mps=5.0, imu=SimulatedImu(imu_rate_hz=400))),
         ):
             messages = list(simulate(options).recording.messages())
             yield Drive(f"{name} {seed}", messages, ())
 
 
 def real(cache: Path) -> Iterator[Drive]:
-    """With the settings that belong to them; of the longer ones the first minutes."""
+    """Yields real drives with their settings; of the longer ones the first minutes."""
     for case in cases():
         fits = "default" not in case.name and "starry" not in case.name  # that one is dark at times
         if (DATA / case.file).exists() and fits:
@@ -77,7 +77,7 @@ def _first(messages: Messages, length_s: float) -> Messages:
 
 
 def explained(program: Path, messages: Messages, options: Sequence[str]) -> Explanation:
-    """What is said of a replay."""
+    """Explains a replay."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "in.plr"
         write_file(path, [m for m in messages if m.kind != Kind.END], len(messages))
@@ -94,8 +94,9 @@ class Tried(NamedTuple):
 
 
 def tried(program: Path, drive: Drive, event: Event, own: Explanation) -> Tried | None:
-    """None where it does not fit the drive. `own` is what is told of the drive without it: what a
-    real drive has by itself is not counted again.
+    """Tries an event in a drive; None where it does not fit.
+
+    `own` is the drive's explanation without it: findings of a real drive itself do not count.
     """
     if not _fits(event, drive, own):
         return None
@@ -118,24 +119,24 @@ def tried(program: Path, drive: Drive, event: Event, own: Explanation) -> Tried 
     if not told:
         return Tried(event.name, drive.name, False, f"{when}: nothing was told")
     off_s = (told[0].from_ns - t) / S
-    right = told[0].cause in event.told and abs(off_s) <= WITHIN_S
+    right = told[0].cause in event.causes and abs(off_s) <= WITHIN_S
     words = f"{when}: {told[0].cause} {off_s:+.2f} s: {told[0].words}"
     return Tried(event.name, drive.name, right, words)
 
 
 def _fits(event: Event, drive: Drive, own: Explanation) -> bool:
     by_imu = header_of_messages(drive.messages).process is Process.IMU
-    if event.whole and own.setup:  # its settings do not fit as they are
+    if event.whole and own.setup:  # its own settings do not fit
         return False
     return event.wheels is None or event.wheels != by_imu
 
 
 def good_share(found: Explanation) -> float:
-    """Of the frames, by the filter's own health."""
+    """Returns the share of the frames that are GOOD by the filter's own health."""
     return found.health.by_health[schema.HEALTHS[GOOD]] / found.health.frames
 
 
-def _is_known(found: Finding, known: Sequence[tuple[Cause, int]]) -> bool:
+def _is_known(found: Incident, known: Sequence[tuple[Cause, int]]) -> bool:
     return any(
         cause is found.cause and abs(begin - found.from_ns) <= WITHIN_S * S
         for cause, begin in known

@@ -45,7 +45,7 @@ Gray = NDArray[np.uint8]
 
 
 def shrunk(lens: Lens, times: int) -> Lens:
-    """The lens of pictures whose squares of so many pixels have become one."""
+    """Returns the lens of pictures in which squares of `times` pixels a side became one."""
     fx, fy, cx, cy = lens.intrinsics
     four = (fx / times, fy / times, (cx + 0.5) / times - 0.5, (cy + 0.5) / times - 0.5)
     size = lens.width_px // times, lens.height_px // times
@@ -53,14 +53,14 @@ def shrunk(lens: Lens, times: int) -> Lens:
 
 
 def small(picture: Gray, times: int) -> Gray:
-    """The means of squares of so many pixels a side."""
+    """Returns the means of squares of `times` pixels a side."""
     rows, columns = (side // times for side in picture.shape)
     squares = picture[: rows * times, : columns * times].reshape(rows, times, columns, times)
     return np.ascontiguousarray(np.round(squares.mean((1, 3))).astype(np.uint8))
 
 
 def turns(t_ns: Times, readings: Inertial, R_CB: Floats) -> list[Floats]:
-    """How points are expected to turn in the camera from each pair to the next, by the gyro."""
+    """Returns the points' rotation in the camera from pair to pair, by the gyro."""
     found = []
     for begin, end in pairwise(t_ns.tolist()):
         between = (readings.t_ns >= begin) & (readings.t_ns < end)
@@ -70,7 +70,7 @@ def turns(t_ns: Times, readings: Inertial, R_CB: Floats) -> list[Floats]:
 
 
 def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]:
-    """The recording as eyes see it, and the mean length of a track."""
+    """Returns the recording with the tracks of eyes, and their mean length."""
     assert found.calibrated.rig is not None
     assert isinstance(found.frames, Pictures)
     assert isinstance(found.motion, Readings)
@@ -95,7 +95,7 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
         found.calibrated.header, camera=Camera(*five), R_CB=R, t_CB_m=np.asarray(camera.t_CB_m),
         image_width_px=rig.left.width_px, image_height_px=rig.left.height_px,
     )  # fmt: skip
-    of_tracks = replace(found, frames=streams.Seen(Path(), t_ns, tracks))
+    of_tracks = replace(found, frames=streams.RawTracks(Path(), t_ns, tracks))
     made = streams._with_motion(header, of_tracks, t_ns, tracks)
     assert found.truth is not None
     truth = streams._at_frames(found.truth, t_ns, found.motion)
@@ -104,7 +104,7 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
 
 
 def later(drive: Recording, first: int) -> Recording:
-    """The same from a frame on."""
+    """Returns the recording from a frame on."""
     begin = drive.frame_t_ns[first]
     rows, own, true = drive.tracks.frame >= first, drive.inertial, drive.truth_t_ns >= begin
     kept = own.t_ns >= begin - 10_000_000
@@ -120,7 +120,7 @@ def later(drive: Recording, first: int) -> Recording:
 
 
 def tell(name: str, drive: Recording, starts: int, program: Path, length: float) -> None:
-    """A row of the table."""
+    """Prints a row of the table."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for k in range(starts):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Events that are put into a recording: what goes wrong, from when on, as messages in their order.
+"""Events that are injected into a recording's messages: what goes wrong, and when.
 
-Each takes the messages, the time when it begins, and chance; the size is drawn, so that no rule can
+Each takes the messages, its begin, and a random generator; the size is drawn, so that no rule can
 fit one number. All work on any recording, simulated or real.
 """
 
@@ -25,12 +25,14 @@ DATA = (*MOTION, Kind.STEREO, Kind.TRUTH, Kind.READING)
 
 
 class Event(NamedTuple):
-    """`told` are the names of causes that are right; `wheels`: it needs twists; `settings` go to
-    the replay beside what is done to the messages.
+    """An event to inject.
+
+    `causes` are the names of right ones; `wheels`: whether it needs twists; `settings` are for the
+    replay.
     """
 
     name: str
-    told: tuple[str, ...]
+    causes: tuple[str, ...]
     into: Callable[[Messages, int, Chance], Messages | None]
     wheels: bool | None = None  # twists alone, an IMU alone, either
     settings: tuple[tuple[str, ...], ...] = ()
@@ -45,7 +47,7 @@ def _each(
 
 
 def slip(messages: Messages, t: int, chance: Chance) -> Messages:
-    """Wheels slip, or slide, for some seconds."""
+    """Makes wheels slip, or slide, for some seconds."""
     factor = chance.choice([0.0, 0.3, 0.5, 1.6, 2.0]) + 0.05 * chance.random()
     until = t + round(chance.uniform(2, 5) * S)
 
@@ -56,7 +58,7 @@ def slip(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def dead_encoder(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The velocity sticks at zero, or at what it was, to the end."""
+    """Makes the velocity stick at zero, or at its last value, to the end."""
     at_zero = chance.random() < 0.5
     held: list[Twist] = []
 
@@ -70,7 +72,7 @@ def dead_encoder(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def dead_gyro(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
-    """The gyro reads nothing, to the end."""
+    """Makes the gyro read nothing, to the end."""
 
     def change(m: Any) -> Message:
         if m.t_ns < t:
@@ -81,7 +83,7 @@ def dead_gyro(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: 
 
 
 def dead_axis(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
-    """The gyro's axis that turns most sticks at what it read, to the end."""
+    """Makes the gyro's axis that turns most stick at its last value, to the end."""
     readings = [m for m in messages if isinstance(m, Twist | Imu)]
     turns = [np.abs(np.atleast_2d(m.w_B_radps)) for m in readings]
     axis = int(np.argmax(np.concatenate(turns).mean(axis=0)))
@@ -99,7 +101,7 @@ def dead_axis(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: 
 
 
 def frozen(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The camera repeats its picture for some seconds."""
+    """Makes the camera repeat its picture for some seconds."""
     until = t + round(chance.uniform(2, 5) * S)
     held: list[Stereo] = []
 
@@ -113,7 +115,7 @@ def frozen(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def clock_step(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The camera's clock steps forward, or back, and stays so; messages come as they came."""
+    """Makes the camera's clock step forward, or back, for good; the order of messages stays."""
     by = round(chance.choice([-1, 1]) * chance.uniform(0.3, 1.5) * S)
 
     def change(m: Stereo) -> Message:
@@ -123,7 +125,7 @@ def clock_step(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def all_clocks_step(messages: Messages, t: int, chance: Chance) -> Messages:
-    """The clock that stamps everything steps forward by some seconds."""
+    """Makes the clock that stamps everything step forward by some seconds."""
     by = round(chance.uniform(1.5, 20) * S)
 
     def change(m: Any) -> Message:
@@ -133,7 +135,7 @@ def all_clocks_step(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def blur(messages: Messages, t: int, chance: Chance) -> Messages:
-    """Most points lie elsewhere for half a second and more, in both images alike."""
+    """Moves most points for half a second and more, in both images alike."""
     until = t + round(chance.uniform(0.5, 0.9) * S)
 
     def change(m: Stereo) -> Message:
@@ -146,7 +148,7 @@ def blur(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def lost_tracks(messages: Messages, t: int, chance: Chance) -> Messages:
-    """Darkness for some seconds; then, as after it, all points have new ids."""
+    """Makes it dark for some seconds, or not; from then on all ids are new, as after darkness."""
     until = t + round(chance.uniform(0.3, 3) * S)
     dark = chance.random() < 0.5
 
@@ -161,8 +163,10 @@ def lost_tracks(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def jump(messages: Messages, t: int, chance: Chance) -> Messages | None:
-    """A part of the drive is cut out: the robot was carried on, unseen by its odometry. As far as
-    the camera still sees enough of what it saw, else nobody could tell; None where it never does.
+    """Cuts a part of the drive out, as if the robot was carried, unseen by its odometry.
+
+    The camera must still see enough of what it saw, or nobody could notice; None where it never
+    does.
     """
     before = [m for m in messages if isinstance(m, Stereo) and m.t_ns < t][-1]
     frames = [m for m in messages if isinstance(m, Stereo) and m.t_ns >= t]
@@ -187,7 +191,7 @@ def jump(messages: Messages, t: int, chance: Chance) -> Messages | None:
 
 
 def shock(messages: Messages, t: int, chance: Chance) -> Messages:
-    """A hit of two or three tenths of a second: readings far beyond what else comes, and blur."""
+    """Adds a hit of two or three tenths of a second: readings far off, and blur."""
     until = t + round(chance.uniform(0.2, 0.4) * S)
     most = {kind: _largest(messages, kind) for kind in MOTION}
 
@@ -209,7 +213,7 @@ def shock(messages: Messages, t: int, chance: Chance) -> Messages:
 
 
 def _largest(messages: Messages, kind: Kind) -> tuple[float, float]:
-    """Of the two vectors of a reading, any component."""
+    """Returns the largest component of each of the two vectors of readings."""
     readings = [m for m in messages if m.kind == kind]
     if not readings:
         return 0.0, 0.0
@@ -221,7 +225,7 @@ def _largest(messages: Messages, kind: Kind) -> tuple[float, float]:
 
 
 def unchanged(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
-    """Nothing happens to the messages."""
+    """Leaves the messages unchanged."""
     return messages
 
 
@@ -253,9 +257,7 @@ EVENTS = (
 
 
 def moving(messages: Messages, for_s: float = 4.0) -> Iterator[int]:
-    """Times from which on the picture moves for a while as it mostly does: where something that
-    happens shows.
-    """
+    """Yields times from which the picture moves for a while as usual, so that an event shows."""
     frames = [m for m in messages if isinstance(m, Stereo)]
     flow = np.array([_flow(a, b) for a, b in pairwise(frames)])
     t = np.array([m.t_ns for m in frames[1:]])
@@ -268,7 +270,7 @@ def moving(messages: Messages, for_s: float = 4.0) -> Iterator[int]:
 
 
 def _flow(a: Stereo, b: Stereo) -> float:
-    """Mean way of the points that both pictures have, px."""
+    """Returns the mean motion of the points in both pictures, px."""
     _, i, j = np.intersect1d(a.ids, b.ids, return_indices=True)
     if len(i) < 5:
         return 0.0

@@ -66,8 +66,10 @@ Figures = dict[str, float]
 
 @dataclass(frozen=True)
 class Case:
-    """A recording, how it is converted (nothing: it is a .plr already), the options of its replay,
-    and the figure by which two runs of it are compared.
+    """A recording with the figure by which its runs are compared.
+
+    It has the command that converts it (empty: it is a .plr already), and the options of its
+    replay.
     """
 
     name: str
@@ -78,12 +80,12 @@ class Case:
 
 
 def conf(name: str) -> tuple[str, ...]:
-    """The options of a config file in tools/config."""
+    """Returns the options of a config file in tools/config."""
     return ("--config", str(ROOT / f"tools/config/{name}.conf"))
 
 
 def cases() -> Iterator[Case]:
-    """What development may look at; other recordings are run where the work is judged."""
+    """Yields the recordings for development; the work is judged on others."""
     for drive in DRIVES:
         file = f"klt/2011_{drive}_sync_KLT.mat"
         yield Case(f"klt {drive}", file, ("klt",), (*conf("klt"), "--start-sigma", "0.01"))
@@ -108,7 +110,7 @@ START = "images/euroc-mh01-start"
 
 
 def by_real_imu() -> Iterator[Case]:
-    """EuRoC: real readings with simulated points, with tracks of real pictures, with pictures."""
+    """Yields EuRoC's drives: with simulated points, with tracks of real pictures, with pictures."""
     for name, file, convert, figure in (
         ("euroc V101", "imu/euroc-V101-real-imu.npz", ("imu-npz",), "ATE"),
         ("euroc V102", "imu/euroc-V102-real-imu.npz", ("imu-npz",), "ATE"),
@@ -129,7 +131,9 @@ def by_real_imu() -> Iterator[Case]:
 
 
 def people(folder: Path) -> Iterator[Case]:
-    """The drives of wild2/01, made in `folder` where they are not there; none without the data."""
+    """Yields the drives of wild2/01, made in `folder` if they are missing; none without the
+    data.
+    """
     if not (DATA / PERSON).is_dir():
         return
     made = folder / "wild2" / Path(PERSON).name
@@ -154,7 +158,7 @@ def people(folder: Path) -> Iterator[Case]:
 
 
 def worst_of(found: Sequence[Figures]) -> Figures:
-    """Of each figure the worst."""
+    """Returns the worst of each figure."""
     names = {name: None for one in found for name in one}
     return {
         name: (min if name in LEAST_IS_WORST else max)(one.get(name, np.nan) for one in found)
@@ -166,7 +170,7 @@ def worst_of(found: Sequence[Figures]) -> Figures:
 
 
 def converted(case: Case, folder: Path) -> Path:
-    """Converted once a folder."""
+    """Returns the converted recording, made once a folder."""
     source = DATA / case.file
     if not case.convert:
         return source
@@ -183,7 +187,7 @@ def converted(case: Case, folder: Path) -> Path:
 
 
 def run(program: Path, recording: Path, options: Sequence[str]) -> list[Message]:
-    """The messages of a replay's log."""
+    """Returns the messages of a replay's log."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.plr"
         command = [str(program), str(recording), "--quiet", *options, "--out", str(log)]
@@ -192,7 +196,7 @@ def run(program: Path, recording: Path, options: Sequence[str]) -> list[Message]
 
 
 def figures(messages: list[Message]) -> Figures:
-    """What a log comes to."""
+    """Returns the figures of a log."""
     answers = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STEREO]
     reports = {m.t_ns: m for m in answers if m.status == 0}
     found, truth = estimate_in(messages), truth_in(messages)
@@ -210,7 +214,7 @@ def figures(messages: list[Message]) -> Figures:
         return out
     with np.errstate(divide="ignore", invalid="ignore"):
         sigmas = np.abs(accuracy.error) / accuracy.sigma
-    sigmas[0] = 0  # aligned there
+    sigmas[0] = 0  # the alignment makes them zero
     out |= {"ATE": accuracy.ate_m, "err0": accuracy.err0_m}
     out["NEES/6"] = accuracy.nees_per_dof or np.nan
     out["worst"] = float(np.linalg.norm(accuracy.estimate.p - accuracy.truth.p, axis=1).max())
@@ -220,7 +224,7 @@ def figures(messages: list[Message]) -> Figures:
 
 
 def _honesty(reports: Sequence[Report | None], worst: Floats) -> Figures:
-    """Whether health fits the error, which is given in sigmas, its largest component."""
+    """Returns whether health fits the error, whose largest component is given in sigmas."""
     good = np.array([report is not None and report.health == GOOD for report in reports])
     seen = np.array([report is not None and report.used >= 3 for report in reports])
     started = np.array([report is None or not report.reasons & NOT_STARTED for report in reports])
@@ -238,7 +242,7 @@ def _honesty(reports: Sequence[Report | None], worst: Floats) -> Figures:
 
 
 def built_without() -> Path:
-    """The programs of a build without the supervisor."""
+    """Returns the programs of a build without the supervisor."""
     folder = ROOT / "build/without-supervisor"
     configure = ["cmake", "-S", str(ROOT), "-B", str(folder), "-DCMAKE_BUILD_TYPE=Release"]
     configure += ["-DPELORUS_BUILD_TESTS=OFF", "-DPLR_SUPERVISE=OFF"]
@@ -252,7 +256,7 @@ def built_without() -> Path:
 
 
 def beside(name: str, figure: str, whole: Figures, alone: Figures) -> str:
-    """A row: the error with and without the supervisor, and what else it changes."""
+    """Returns a row: the error with and without the supervisor, and what else it changes."""
     ratio = whole[figure] / alone[figure]
     told = f"**{ratio:.2f}**" if ratio > WORSE else f"{ratio:.2f}"
     cells = [name, "road" if name == "03" else figure]
@@ -263,7 +267,7 @@ def beside(name: str, figure: str, whole: Figures, alone: Figures) -> str:
 
 
 def comparison(program: Path, without: Path, given: argparse.Namespace) -> Iterator[str]:
-    """The lines of the table, every real recording and the worst of the drives with a person."""
+    """Yields the lines of the table: every real recording, and the worst drive with a person."""
     yield "| recording | figure | with, m | without, m | ratio | NEES/6 | GOOD beyond 3 sigma |"
     yield "|---|---|---|---|---|---|---|"
 
@@ -313,7 +317,7 @@ def compare_supervisor(program: Path, given: argparse.Namespace) -> None:
 
 
 def parser_of(about: str | None, only: str) -> argparse.ArgumentParser:
-    """The options that the harnesses of recordings share."""
+    """Returns the options that the harnesses of recordings share."""
     parser = argparse.ArgumentParser(
         description=about, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -325,12 +329,12 @@ def parser_of(about: str | None, only: str) -> argparse.ArgumentParser:
 
 
 def wanted(some: Iterator[Case], only: str) -> Iterator[Case]:
-    """Those that are named and there."""
+    """Yields the cases that are named, and whose recording exists."""
     return (case for case in some if only in case.name and (DATA / case.file).exists())
 
 
 def judged(programs: Sequence[Path], case: Case, given: argparse.Namespace) -> list[Figures]:
-    """The figures of each program."""
+    """Returns the figures of each program."""
     recording = converted(case, given.cache)
     out = []
     for program in programs:
@@ -345,7 +349,7 @@ def judged(programs: Sequence[Path], case: Case, given: argparse.Namespace) -> l
 
 
 def print_rows(name: str, found: Sequence[Figures]) -> None:
-    """One for each precision."""
+    """Prints a row for each precision."""
     for title, one in zip((name, "  in float64"), found, strict=False):
         row = "".join(f"{one.get(column, np.nan):9.3g}" for column in COLUMNS)
         print(f"{title:28}{row}", flush=True)

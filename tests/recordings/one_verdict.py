@@ -42,14 +42,14 @@ BEFORE = re.compile(r"^with the settings as they are: (.*)$", re.MULTILINE)
 
 
 class Voices(NamedTuple):
-    """What each command said, and whether the result is right; `way` in m."""
+    """What each command printed, and whether the result is right; `way` in m."""
 
     check: str
     report: str
     page: str
     explain: str
     before: str  # explain with the settings as they are
-    named: str  # what check says of these
+    named: str  # in the words of check
     ate_m: float | None
     way_m: float
 
@@ -72,12 +72,12 @@ class Voices(NamedTuple):
 
 
 def _grade(words: str) -> str:
-    """Without how far the way may be off."""
+    """Returns the verdict without the position error."""
     return words.partition(", to ")[0]
 
 
 def printed(*words: str) -> str:
-    """What a command prints."""
+    """Returns what a command prints."""
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
         pelorus(list(words))
@@ -85,7 +85,7 @@ def printed(*words: str) -> str:
 
 
 def asked(drive: Path, folder: Path) -> Voices:
-    """All four."""
+    """Runs all four commands."""
     told = printed("try", str(drive), "--out", str(folder))
     check, report = SAID.findall(told)[:2]
     named = BEFORE.search(told)
@@ -107,7 +107,7 @@ def asked(drive: Path, folder: Path) -> Voices:
 def drives(
     count: int, seed: int, only: str, real: bool, folder: Path
 ) -> Iterator[tuple[str, Path]]:
-    """Name and recording."""
+    """Yields name and recording."""
     for kind, by, own in robots.chosen(count, seed):
         drive = robots.drive(kind, by, own) if only in f"{kind}, by {by}" else None
         if drive is not None:
@@ -121,7 +121,7 @@ def drives(
 
 
 def main() -> int:
-    """A line a drive, and the counts; 1 where the commands disagree."""
+    """Prints a line for each drive, and the counts; returns 1 where the commands disagree."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

@@ -43,7 +43,7 @@ class Series(NamedTuple):
 
 
 def series(messages: list[Message]) -> Series | None:
-    """Of one recording; None without truth or readings."""
+    """Returns the series of one recording; None without truth or readings."""
     readings = [m for m in messages if isinstance(m, Imu)]
     truth = truth_in(messages)
     if truth is None or not readings:
@@ -61,7 +61,7 @@ def series(messages: list[Message]) -> Series | None:
 
 
 def reckoned(t: Floats, w: Floats) -> Slerp:
-    """Attitudes by the gyro alone, from the first reading on."""
+    """Returns attitudes by the gyro alone, from the first reading on."""
     turns = Rotation.from_rotvec((w[1:] + w[:-1]) / 2 * np.diff(t)[:, None])
     out = [Rotation.identity()]
     for turn in turns:
@@ -70,8 +70,9 @@ def reckoned(t: Floats, w: Floats) -> Slerp:
 
 
 def late_s(s: Series) -> tuple[float, Floats, float]:
-    """By how much the truth's clock is later than the gyro's, the gyro's bias, and the RMS of what
-    the truth turns beside the gyro in a frame.
+    """Returns the delay of the truth's clock, s, the gyro's bias, and the RMS difference of turns.
+
+    Turns of truth and gyro are compared from frame to frame.
     """
     gyro = reckoned(s.t, s.w)
     knots = np.arange(max(s.at[0], s.t[0]) + 0.1, min(s.at[-1], s.t[-1]) - 0.1, FRAME_S)
@@ -91,7 +92,7 @@ def late_s(s: Series) -> tuple[float, Floats, float]:
 
 
 def twice_summed(t: Floats, rows: Floats) -> tuple[Floats, Floats]:
-    """First and second integral by the trapezium rule, of rows (n, ...)."""
+    """Returns first and second integral by the trapezium rule, of rows (n, ...)."""
     dt = np.diff(t).reshape(-1, *([1] * (rows.ndim - 1)))
     once = np.concatenate((0 * rows[:1], np.cumsum((rows[1:] + rows[:-1]) / 2 * dt, axis=0)))
     change = once[:-1] * dt + (2 * rows[:-1] + rows[1:]) / 6 * dt**2
@@ -99,7 +100,7 @@ def twice_summed(t: Floats, rows: Floats) -> tuple[Floats, Floats]:
 
 
 def windows(s: Series) -> list[tuple[Floats, Floats]]:
-    """Readings and truths (masks) of each window in which both are whole."""
+    """Returns masks of readings and truths of each window in which both are complete."""
     out = []
     for begin in np.arange(max(s.t[0], s.at[0]), min(s.t[-1], s.at[-1]) - WINDOW_S, WINDOW_S):
         readings = (s.t >= begin) & (s.t <= begin + WINDOW_S)
@@ -110,15 +111,16 @@ def windows(s: Series) -> list[tuple[Floats, Floats]]:
 
 
 def at_truths(t: Floats, rows: Floats, at: Floats) -> Floats:
-    """Rows (n, ...) at other times."""
+    """Returns rows (n, ...) interpolated at other times."""
     flat = rows.reshape(len(rows), -1)
     out = np.stack([np.interp(at, t, column) for column in flat.T], axis=-1)
     return out.reshape(len(at), *rows.shape[1:])
 
 
 def design(t: Floats, turned: Rotation, a: Floats, at: Floats) -> tuple[Floats, Floats, Floats]:
-    """What of the positions follows from the readings (n, 3); from a place, a velocity and biases
-    of a window (n, 3, 9); and from g (n,).
+    """Returns positions by the readings (n, 3), and their derivatives by the unknowns.
+
+    These are a place, a velocity and biases of a window (n, 3, 9), and g (n,).
     """
     R = turned.as_matrix()
     _, way = twice_summed(t, np.einsum("nij,nj->ni", R, a))
@@ -130,7 +132,7 @@ def design(t: Floats, turned: Rotation, a: Floats, at: Floats) -> tuple[Floats, 
 
 
 def gravity(s: Series, late: float) -> Floats:
-    """(3,), in the truth's world: of all windows together."""
+    """Returns g (3,) in the truth's world, fitted to all windows together."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     attitudes = Slerp(s.at + 1e-12, s.turned)
     for readings, truths in windows(s):
@@ -146,8 +148,9 @@ def gravity(s: Series, late: float) -> Floats:
 
 
 def residual_m(s: Series, late: float, gyro_bias: Floats, g: Floats) -> float:
-    """RMS of positions about the readings, an axis; the attitude is the gyro's, and the first one
-    of a window is fitted.
+    """Returns the RMS of positions about the readings, an axis.
+
+    The attitude is the gyro's, and the first one of a window is fitted.
     """
     attitudes = Slerp(s.at, s.turned)
     off = []

@@ -37,7 +37,7 @@ RECOVERED = schema.number("reason", "RECOVERED")
 
 
 class Frame(NamedTuple):
-    """What one precision said after a frame."""
+    """The estimate of one precision after a frame."""
 
     pose: Pose
     P: Floats  # of the pose
@@ -46,7 +46,7 @@ class Frame(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """The two at a frame."""
+    """Both precisions at a frame."""
 
     t_s: float
     apart_m: float
@@ -62,7 +62,7 @@ class Pair(NamedTuple):
 
 
 def frames_of(messages: Sequence[Message]) -> Iterator[tuple[int, Frame]]:
-    """By their time; what has no covariance is left out, and was told as recovered before."""
+    """Yields frames by time, without those that have no covariance, which recovered before."""
     recovered = {
         m.t_ns
         for m in messages
@@ -75,7 +75,10 @@ def frames_of(messages: Sequence[Message]) -> Iterator[tuple[int, Frame]]:
 
 
 def least_pivot(P: Floats) -> float:
-    """Of the Cholesky factor of P scaled to ones on its diagonal, squared; negative: none."""
+    """Returns the smallest pivot of the Cholesky factor of P as a correlation matrix, squared.
+
+    It is negative where P is not positive.
+    """
     diagonal = np.diag(P)
     if not (diagonal > 0).all():
         return float(diagonal.min())
@@ -87,7 +90,7 @@ def least_pivot(P: Floats) -> float:
 
 
 def compared(a: Frame, b: Frame, t_s: float) -> Pair:
-    """Float32's frame beside float64's."""
+    """Compares float32's frame with float64's."""
     poses = (Poses(x.pose.R_WB[None], x.pose.p_WB_m[None]) for x in (b, a))
     back, there = next(poses), next(poses)
     xi = se3.log(se3.compose(se3.inverse(back), there))[0]
@@ -103,7 +106,7 @@ def compared(a: Frame, b: Frame, t_s: float) -> Pair:
 
 
 def line(pair: Pair) -> str:
-    """Of the table."""
+    """Returns a line of the table."""
     least = " ".join(f"{x:8.1e}" for x in pair.least)
     both = zip(("f32", "f64"), pair.recovered, strict=True)
     told = " ".join(f"{precision} diverged" for precision, is_so in both if is_so)
@@ -114,7 +117,7 @@ def line(pair: Pair) -> str:
 
 
 def summary(pairs: Sequence[Pair]) -> str:
-    """What the drive comes to."""
+    """Returns the figures of the whole drive."""
     first = next((pair.t_s for pair in pairs if pair.parted), None)
     worst = max(pairs, key=lambda pair: pair.in_sigmas)
     least = [min(pair.least[k] for pair in pairs) for k in range(4)]
@@ -131,7 +134,7 @@ def summary(pairs: Sequence[Pair]) -> str:
 
 
 def main() -> None:
-    """Replay twice and print."""
+    """Replays twice and prints."""
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
     parser = argparse.ArgumentParser(

@@ -61,7 +61,7 @@ class Real:
 
 
 def reals() -> Iterator[Real]:
-    """Those of docs/TESTING.md."""
+    """Yields the recordings of docs/TESTING.md."""
     yield Real("Starry Night", "starry-night/dataset3.mat", ("starry-night",))
     for name, drive in (("0001", "09_26_drive_0001"), ("0036", "09_26_drive_0036")):
         file = f"klt/2011_{drive}_sync_KLT.mat"
@@ -73,7 +73,7 @@ def reals() -> Iterator[Real]:
 
 
 def opened(case: Real, folder: Path) -> Path | None:
-    """Converted; None where the file is absent."""
+    """Returns the converted recording; None where the file is absent."""
     source = DATA / case.file
     if not source.exists():
         return None
@@ -86,7 +86,7 @@ def opened(case: Real, folder: Path) -> Path | None:
 
 
 def found_in(drive: robots.Drive) -> tuple[Recording, list[str]]:
-    """What a converter and `check` find, in words."""
+    """Returns what a converter and `check` find, in words."""
     recording, findings = converted(drive.streams, None, True)
     said = {f.subject: f"{f.subject}: {f.evidence}" for f in findings if f.found}
     faults = judged_of(list(recording.messages()), recording).faults
@@ -95,7 +95,7 @@ def found_in(drive: robots.Drive) -> tuple[Recording, list[str]]:
 
 
 def clean(count: int, seed: int, only: str) -> list[tuple[str, int, int]]:
-    """Kind, drives, and how many of them are called faulty."""
+    """Returns kind, drives, and how many of them are called faulty."""
     asked: Counter[str] = Counter()
     false: Counter[str] = Counter()
     for kind, by, own in robots.chosen(count, seed):
@@ -114,7 +114,7 @@ def clean(count: int, seed: int, only: str) -> list[tuple[str, int, int]]:
 
 
 def with_faults(only: str, folder: Path) -> list[tuple[str, int, int, int]]:
-    """Recording, faults put in, named rightly, and less than the recording can tell."""
+    """Returns recording, injected faults, those named right, and those beyond the data."""
     rows = []
     drives: list[tuple[str, Recording]] = []
     for case in reals():
@@ -136,7 +136,7 @@ def with_faults(only: str, folder: Path) -> list[tuple[str, int, int, int]]:
 
 
 def verdict_of(name: str, path: Path, program: Path) -> tuple[bool, bool]:
-    """Whether the result is right, and whether it is not to be trusted."""
+    """Returns whether the result is right, and whether the verdict is not to trust it."""
     with tempfile.TemporaryDirectory() as folder:
         found = checked.check(program, path, {}, Path(folder))
     figures = {title: after for title, _, after in found.rows}
@@ -158,7 +158,7 @@ def verdict_of(name: str, path: Path, program: Path) -> tuple[bool, bool]:
 def verdicts(
     count: int, seed: int, only: str, program: Path, folder: Path
 ) -> list[tuple[str, int, int, int]]:
-    """Kind, drives, those that are right, and of these the ones that are not to be trusted."""
+    """Returns kind, drives, right ones, and how many of these are not trusted."""
     rows: dict[str, list[tuple[bool, bool]]] = {}
     for kind, by, own in robots.chosen(count, seed):
         drive = robots.drive(kind, by, own) if only in f"{kind}, by {by}" else None
@@ -183,7 +183,7 @@ def verdicts(
 
 
 def table(title: tuple[str, ...], rows: Sequence[tuple[str | int, ...]]) -> None:
-    """As docs/TESTING.md has it, with the sums."""
+    """Prints a table with sums, as in docs/TESTING.md."""
     print(f"| {' | '.join(title)} |", f"|{'---|' * len(title)}", sep="\n")
     for row in rows:
         print(f"| {' | '.join(str(x) for x in row)} |")
@@ -192,7 +192,7 @@ def table(title: tuple[str, ...], rows: Sequence[tuple[str | int, ...]]) -> None
 
 
 def main() -> None:
-    """Print the tables that are asked for."""
+    """Prints the tables that are asked for."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

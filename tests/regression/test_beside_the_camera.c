@@ -30,7 +30,7 @@ static plr_report show(double x, double y, double z, double sigma_m, bool is_kno
     for (int i = 0; i < 3; i++)
         known.P_W_m2[4 * i] = sigma_m * sigma_m;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_insert_known(&filter, &known));
-    filter.slots[0].known = is_known;
+    filter.belief.slots[0].known = is_known;
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &frame, &report));
     return report;

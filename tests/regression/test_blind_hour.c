@@ -40,7 +40,7 @@ static void test_the_rotation_is_one_after_an_hour_in_the_dark(void) {
 static double distance_of_first_landmark(void) {
     double sum = 0;
     for (int i = 0; i < 3; i++)
-        sum += (double)rig.filter.slots[0].x[i] * (double)rig.filter.slots[0].x[i];
+        sum += (double)rig.filter.belief.slots[0].x[i] * (double)rig.filter.belief.slots[0].x[i];
     return sqrt(sum);
 }
 

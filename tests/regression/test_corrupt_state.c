@@ -71,7 +71,8 @@ static plr_status restore_with(uint32_t bit) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(PLR_OK, plr_filter_pose(&other, &pose), at);
     ask_everything(at);
     TEST_ASSERT_NOT_EQUAL_INT_MESSAGE(
-        PLR_E_DAMAGED, plr_filter_predict(&other, rig.filter.t_ns + RIG_STEP_NS, &still), at);
+        PLR_E_DAMAGED, plr_filter_predict(&other, rig.filter.belief.t_ns + RIG_STEP_NS, &still),
+        at);
     ask_everything(at);
     return status;
 }
@@ -102,7 +103,7 @@ static void test_no_question_is_answered_with_a_number_that_is_not_finite(void) 
 
 static void test_a_mirror_image_is_no_pose(void) {
     plr_real R[9];
-    memcpy(R, rig.filter.R_WB, sizeof R);
+    memcpy(R, rig.filter.belief.R_WB, sizeof R);
     for (unsigned i = 0; i < 9; i += 3)
         R[i] = -R[i];
     /* the tests run on little-endian machines */

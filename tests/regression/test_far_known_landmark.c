@@ -61,10 +61,11 @@ static void test_its_bearing_is_known_as_well_as_it_was(void) {
         const plr_landmark known = far_landmark(&chance, range_m, across2);
         rig_begin();
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_insert_known(&rig.filter, &known));
-        const unsigned row = plr_covariance_row(&rig.filter, 0);
+        const unsigned row = plr_covariance_row(&rig.filter.belief, 0);
         const double due = BEARING_SIGMA * BEARING_SIGMA;
         for (unsigned i = row; i < row + 2; i++)
-            TEST_ASSERT_DOUBLE_WITHIN(0.005 * due, due, (double)rig.filter.P[plr_packed_at(i, i)]);
+            TEST_ASSERT_DOUBLE_WITHIN(0.005 * due, due,
+                                      (double)rig.filter.belief.P[plr_packed_at(i, i)]);
     }
 }
 

@@ -53,9 +53,9 @@ static void test_a_robot_that_stands_knows_far_ranges_no_better_than_their_dispa
     rig.config.pixel_sigma_px = 2;
     for (int drive = 0; drive < DRIVES; drive++) {
         stand();
-        for (unsigned slot = 0; slot < rig.filter.count; slot++) {
-            const double sigma = sqrt((double)plr_covariance_of_range(&rig.filter, slot));
-            const plr_real *q = rig.filter.slots[slot].x;
+        for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
+            const double sigma = sqrt((double)plr_covariance_of_range(&rig.filter.belief, slot));
+            const plr_real *q = rig.filter.belief.slots[slot].x;
             const double range = sqrt((double)(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]));
             const double due = bound * (double)q[2] / range; /* disparities say depths */
             TEST_ASSERT_GREATER_THAN_DOUBLE(0.97 * due, sigma);

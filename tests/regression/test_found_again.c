@@ -306,9 +306,9 @@ static void test_landmarks_of_the_map_stay_landmarks_of_the_map(void) {
     set_pose_off_by(xi, 0.05);
     rig_frame();
     rig_drive(40);
-    for (unsigned slot = 0; slot < rig.filter.count; slot++)
-        known += rig.filter.slots[slot].known;
-    TEST_ASSERT_GREATER_THAN_UINT(rig.filter.count / 2, known);
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+        known += rig.filter.belief.slots[slot].known;
+    TEST_ASSERT_GREATER_THAN_UINT(rig.filter.belief.count / 2, known);
     demand_covered();
 }
 

@@ -36,11 +36,14 @@ void setUp(void) {
 static void test_a_pose_is_found_by_the_camera_as_it_is_estimated(void) {
     plr_found_pose found;
     rig_drive(100);
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, -TURNED_RAD, (double)rig.filter.calibration.moved[1]); /* y */
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, -TURNED_RAD,
+                              (double)rig.filter.camera.estimate.moved[1]); /* y */
     rig_twists();
     const plr_frame frame = scene_look(&rig.world);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
-    TEST_ASSERT_TRUE(plr_find_pose(&rig.filter, &frame, frame.count, false, &found));
+    /* the rows of that frame, which is still here */
+    TEST_ASSERT_TRUE(plr_find_pose(&rig.filter.belief, &rig.filter.camera, &rig.filter.map,
+                                   rig.filter.work.Vt, &rig.filter.work.sightings, false, &found));
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_DOUBLE_WITHIN(0.05, rig.world.T_WB[4 * i + 3], found.p_WB[i]);
         for (int j = 0; j < 3; j++)

@@ -64,9 +64,9 @@ static void go(double off_px, double point_mps) {
 }
 
 static const plr_slot *point(void) {
-    const uint16_t slot = plr_slots_find(&rig.filter, OUTLIER_ID);
+    const uint16_t slot = plr_slots_find(&rig.filter.belief, OUTLIER_ID);
     TEST_ASSERT_NOT_EQUAL_UINT16(PLR_NO_SLOT, slot);
-    return &rig.filter.slots[slot];
+    return &rig.filter.belief.slots[slot];
 }
 
 /* Each by itself passes the gate: |e|^2 is 3 in the mean, and 5 here. */

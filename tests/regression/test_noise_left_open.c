@@ -26,8 +26,8 @@ static void test_a_pose_set_after_divergence_is_kept_by_the_next_frame(void) {
         rig_drive(5);
         rig_twist();
         rig_twist();
-        const unsigned row = plr_covariance_row(&rig.filter, 0);
-        rig.filter.P[plr_packed_at(row, row)] = -1; /* found when the motion is applied */
+        const unsigned row = plr_covariance_row(&rig.filter.belief, 0);
+        rig.filter.belief.P[plr_packed_at(row, row)] = -1; /* found when the motion is applied */
         reseal(&rig.filter);
         plr_frame frame = scene_look(&rig.world);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));

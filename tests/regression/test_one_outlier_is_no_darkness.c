@@ -16,9 +16,9 @@ void setUp(void) {
 }
 
 static const plr_slot *slot_of(uint32_t id) {
-    for (unsigned i = 0; i < rig.filter.count; i++)
-        if (rig.filter.slots[i].id == id)
-            return &rig.filter.slots[i];
+    for (unsigned i = 0; i < rig.filter.belief.count; i++)
+        if (rig.filter.belief.slots[i].id == id)
+            return &rig.filter.belief.slots[i];
     return NULL;
 }
 

@@ -23,7 +23,7 @@ static void ask_everything(void) {
     plr_landmark landmark;
     TEST_ASSERT_TRUE(specimen_gives_finite_numbers(&rig.filter)); /* asks for all there is */
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT,
-                          plr_filter_landmark(&rig.filter, rig.filter.count, &landmark));
+                          plr_filter_landmark(&rig.filter, rig.filter.belief.count, &landmark));
 }
 
 static void demand_same(unsigned frame) {

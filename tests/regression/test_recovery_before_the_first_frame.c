@@ -25,10 +25,10 @@ static void tilt_variance(double of[2]) {
 
 static void demand_that_tilt_stays_as_uncertain(void) {
     double before[2], after[2];
-    const unsigned row = plr_row_of(f, PLR_BLOCK_VELOCITY);
+    const unsigned row = plr_row_of(&f->belief, PLR_BLOCK_VELOCITY);
     tilt_variance(before);
     TEST_ASSERT_TRUE(before[0] > 1e-7 && before[1] > 1e-7);
-    f->P[plr_packed_at(row, row)] = PLR_R(-1);
+    f->belief.P[plr_packed_at(row, row)] = PLR_R(-1);
     reseal(f);
     imu_rig_readings(IMU_RIG_EVERY);
     imu_rig_frame();
@@ -40,8 +40,8 @@ static void demand_that_tilt_stays_as_uncertain(void) {
 
 static void test_a_recovery_after_a_start_at_rest_keeps_the_tilts_covariance(void) {
     imu_rig_begin(IMU_RIG_AT_REST, 1);
-    for (unsigned k = 0; k < 3 * 400 && !f->inertial.started; k++)
+    for (unsigned k = 0; k < 3 * 400 && !f->source.inertial.started; k++)
         (void)imu_rig_read();
-    TEST_ASSERT_EQUAL_UINT8(1, f->inertial.started);
+    TEST_ASSERT_EQUAL_UINT8(1, f->source.inertial.started);
     demand_that_tilt_stays_as_uncertain();
 }

@@ -42,7 +42,7 @@ static void test_what_a_filter_with_an_imu_tells_is_symmetric_to_the_bit(void) {
 
 /* Makes two of the pose's numbers correlated by this much, and no others. */
 static void correlate(double correlation) {
-    plr_real *P = rig.filter.P;
+    plr_real *P = rig.filter.belief.P;
     const double x = (double)P[plr_packed_at(0, 0)], yaw = (double)P[plr_packed_at(5, 5)];
     for (unsigned i = 0; i < 6; i++)
         for (unsigned j = 0; j < i; j++)
@@ -62,7 +62,7 @@ static void test_what_is_told_of_a_pose_is_taken_back(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
         TEST_ASSERT_TRUE(plr_is_covariance(P, 6));
         plr_filter other = rig.filter;
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&other, other.t_ns, &pose, P));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&other, other.belief.t_ns, &pose, P));
     }
 }
 
@@ -83,7 +83,7 @@ static void test_a_covariance_that_is_not_finite_is_not_told(void) {
     double P[36] = {7};
     rig_begin();
     rig_drive(3);
-    rig.filter.P[plr_packed_at(1, 1)] = (plr_real)INFINITY;
+    rig.filter.belief.P[plr_packed_at(1, 1)] = (plr_real)INFINITY;
     reseal(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_pose_covariance(&rig.filter, P));
     TEST_ASSERT_TRUE(P[0] == 7);
@@ -106,7 +106,7 @@ static void test_a_landmark_that_is_not_finite_is_not_handed_to_the_map(void) {
     rig_begin();
     rig_drive(3);
     const unsigned active = plr_filter_landmark_count(&rig.filter);
-    rig.filter.slots[1].x[0] = (plr_real)INFINITY;
+    rig.filter.belief.slots[1].x[0] = (plr_real)INFINITY;
     reseal(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_landmark(&rig.filter, 1, &landmark));
     TEST_ASSERT_EQUAL_UINT(7, landmark.id);

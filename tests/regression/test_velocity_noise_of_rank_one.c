@@ -22,8 +22,8 @@ static void add_noise(plr_real seconds, plr_real sigma) {
     const plr_real half = PLR_R(0.5) * seconds, variance = sigma * sigma;
     for (unsigned i = 0; i < 3; i++) {
         f->motion.Q[(PLR_POSE_DIM + 1) * i] += half * half * variance;
-        f->core_motion.Q_nc[PLR_REST_DIM * i + i] += half * variance;
-        f->core_motion.Q_cc[(PLR_REST_DIM + 1) * i] += variance;
+        f->motion.core.Q_nc[PLR_REST_DIM * i + i] += half * variance;
+        f->motion.core.Q_cc[(PLR_REST_DIM + 1) * i] += variance;
     }
     reseal(f);
 }

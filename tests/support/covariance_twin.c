@@ -18,7 +18,7 @@ void twin_for_each_size(void (*check)(void)) {
         for (unsigned size = 0; size < sizeof landmarks / sizeof *landmarks; size++) {
             snprintf(twin.at, sizeof twin.at, "%u landmarks, bias %d", landmarks[size], bias);
             specimen_filter(&twin.filter, &twin.chance, PLR_MODEL_BODY, bias, landmarks[size]);
-            twin.n = plr_covariance_dim(&twin.filter);
+            twin.n = plr_covariance_dim(&twin.filter.belief);
             twin.P = specimen_covariance(&twin.filter);
             twin.expected = specimen_covariance(&twin.filter);
             check();

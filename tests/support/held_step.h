@@ -13,7 +13,7 @@ static inline void held_step(const plr_process *process, plr_filter *f, plr_time
     plr_process_step step = {.seconds = seconds, .interval = interval};
     memcpy(step.mean, reading, sizeof step.mean);
     memcpy(step.whole, reading, sizeof step.whole);
-    process->step(f, t_ns, &step);
+    process->step(&f->belief, &f->motion, &f->source, t_ns, &step);
 }
 
 #endif

@@ -199,9 +199,9 @@ void imu_rig_demand_refusal(plr_status expected, plr_status got) {
     const plr_totals *was = &imu_rig.before.totals, *is = &imu_rig.filter.totals;
     TEST_ASSERT_EQUAL_INT(expected, got);
     after = imu_rig.filter; /* what it counts besides: the fault, repetitions, spikes */
-    after.inertial.fault = imu_rig.before.inertial.fault;
-    after.inertial.repeated = imu_rig.before.inertial.repeated;
-    after.inertial.out_of_line = imu_rig.before.inertial.out_of_line;
+    after.source.inertial.fault = imu_rig.before.source.inertial.fault;
+    after.source.inertial.repeated = imu_rig.before.source.inertial.repeated;
+    after.source.inertial.out_of_line = imu_rig.before.source.inertial.out_of_line;
     TEST_ASSERT_TRUE_MESSAGE(specimen_same_state(&imu_rig.before, &after),
                              "a refused call changed the state");
     TEST_ASSERT_EQUAL_UINT32(was->resets, is->resets);

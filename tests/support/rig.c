@@ -118,7 +118,7 @@ double rig_sigma_m(void) {
 }
 
 double rig_smallest_correlation(void) {
-    const unsigned n = plr_covariance_dim(&rig.filter);
+    const unsigned n = plr_covariance_dim(&rig.filter.belief);
     double *P = specimen_covariance(&rig.filter), *C = specimen_zeros(n, n);
     for (unsigned i = 0; i < n; i++)
         for (unsigned j = 0; j < n; j++)

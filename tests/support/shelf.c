@@ -36,10 +36,10 @@ void shelf_tear_down(void) {
 }
 
 void shelf_become(unsigned k) {
-    filter.t_ns = 1000000000u * (k + 1);
-    filter.p_WB[0] = k;
-    filter.slots[0].times_seen = 10 * k;
-    filter.P[0] = PLR_R(0.5) + (plr_real)k;
+    filter.belief.t_ns = 1000000000u * (k + 1);
+    filter.belief.p_WB[0] = k;
+    filter.belief.slots[0].times_seen = 10 * k;
+    filter.belief.P[0] = PLR_R(0.5) + (plr_real)k;
     reseal(&filter);
 }
 

@@ -46,7 +46,7 @@ static void random_point(rng *r, double q[3]) {
 
 /* A landmark of that camera point: itself, or its place in the world. */
 static void put_point(const plr_filter *f, const double q[3], plr_slot *slot) {
-    const plr_camera *c = &f->par.camera;
+    const plr_camera *c = &f->camera.given;
     double s[3] = {0}, m[3];
     memcpy(m, q, sizeof m);
     if (f->config.model == PLR_MODEL_WORLD) {
@@ -54,9 +54,9 @@ static void put_point(const plr_filter *f, const double q[3], plr_slot *slot) {
             for (int j = 0; j < 3; j++)
                 s[i] += (double)c->R_CB[3 * j + i] * (q[j] - (double)c->t_CB[j]);
         for (int i = 0; i < 3; i++) {
-            m[i] = f->p_WB[i];
+            m[i] = f->belief.p_WB[i];
             for (int j = 0; j < 3; j++)
-                m[i] += (double)f->R_WB[3 * i + j] * s[j];
+                m[i] += (double)f->belief.R_WB[3 * i + j] * s[j];
         }
     }
     to_reals(slot->x, m, 3);
@@ -65,7 +65,7 @@ static void put_point(const plr_filter *f, const double q[3], plr_slot *slot) {
 /* Standard deviation of a row of the state: of a filter that knows itself fairly well. */
 static double sigma_of(const plr_filter *f, unsigned row) {
     static const double bearing_rad = 2e-3, inverse_range = 2e-3, place_m = 0.1;
-    const unsigned first = plr_covariance_row(f, 0);
+    const unsigned first = plr_covariance_row(&f->belief, 0);
     if (row < 6)
         return row < 3 ? 0.05 : 0.005;
     if (row < first)
@@ -76,29 +76,29 @@ static double sigma_of(const plr_filter *f, unsigned row) {
 }
 
 static void random_covariance(plr_filter *f, rng *r) {
-    const unsigned n = plr_covariance_dim(f);
+    const unsigned n = plr_covariance_dim(&f->belief);
     double *A = specimen_zeros(n, n);
     random_spd(r, n, 0.1, A);
     for (unsigned i = 0; i < n; i++)
         for (unsigned j = 0; j < n; j++)
             A[i * n + j] *= sigma_of(f, i) * sigma_of(f, j);
-    pack_lower(f->P, A, n);
+    pack_lower(f->belief.P, A, n);
     free(A);
 }
 
 /* Landmarks and a covariance for a filter that was initialised. */
 static void fill(plr_filter *f, rng *r, unsigned landmarks) {
-    f->frame_number = 1;
-    for (f->count = 0; f->count < landmarks; f->count++) {
-        plr_slot *slot = &f->slots[f->count];
+    f->belief.frame_number = 1;
+    for (f->belief.count = 0; f->belief.count < landmarks; f->belief.count++) {
+        plr_slot *slot = &f->belief.slots[f->belief.count];
         double q[3];
         random_point(r, q);
         memset(slot, 0, sizeof *slot);
         put_point(f, q, slot);
-        slot->id = f->count + 1;
+        slot->id = f->belief.count + 1;
         slot->times_seen = 1;
-        slot->last_frame = f->frame_number;
-        slot->last_seen_ns = f->t_ns;
+        slot->last_frame = f->belief.frame_number;
+        slot->last_seen_ns = f->belief.t_ns;
     }
     random_covariance(f, r);
     reseal(f);
@@ -122,7 +122,7 @@ void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, uns
     default_config(&config, model, bias);
     place(f, r, &config);
     for (int i = 0; bias && i < 6; i++)
-        f->bias[i] = (plr_real)(0.01 * rng_normal(r));
+        f->belief.bias[i] = (plr_real)(0.01 * rng_normal(r));
     fill(f, r, landmarks);
 }
 
@@ -137,14 +137,14 @@ void specimen_imu(plr_filter *f, rng *r, unsigned landmarks) {
     if (plr_filter_set_velocity(f, v, variance) != PLR_OK)
         abort();
     for (int i = 0; i < 6; i++)
-        f->bias[i] = (plr_real)((i < 3 ? 0.1 : 0.01) * rng_normal(r));
+        f->belief.bias[i] = (plr_real)((i < 3 ? 0.1 : 0.01) * rng_normal(r));
     fill(f, r, landmarks);
 }
 
 double *specimen_covariance(const plr_filter *f) {
-    const unsigned n = plr_covariance_dim(f);
+    const unsigned n = plr_covariance_dim(&f->belief);
     double *P = specimen_zeros(n, n);
-    unpack_symmetric(P, f->P, n);
+    unpack_symmetric(P, f->belief.P, n);
     return P;
 }
 
@@ -176,7 +176,7 @@ void specimen_bias_derivative(const plr_motion *motion, double B[36]) {
 plr_measurement specimen_measurement(const plr_filter *f, unsigned slot,
                                      const plr_observation *seen) {
     plr_measurement m;
-    if (!plr_stereo_measure(f, slot, seen, &m))
+    if (!plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m))
         abort();
     return m;
 }
@@ -200,13 +200,14 @@ void specimen_put_rows(double *H, unsigned n, const plr_rows *rows) {
 plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
     plr_measurement m;
     plr_verdict none = {.accepted = false};
-    return plr_stereo_measure(f, slot, seen, &m) ? plr_gate_judge(f, &m) : none;
+    return plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m) ? plr_gate_judge(f, &m)
+                                                                      : none;
 }
 
 plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {
     plr_real z[3];
     specimen_prediction(f, slot, z);
-    return (plr_observation){f->slots[slot].id, (float)z[0] + shift_px[0],
+    return (plr_observation){f->belief.slots[slot].id, (float)z[0] + shift_px[0],
                              (float)z[2] + shift_px[1], (float)z[1] + shift_px[2],
                              (float)z[2] + shift_px[3]};
 }
@@ -226,13 +227,14 @@ bool specimen_same_state(const plr_filter *a, const plr_filter *b) {
     memcpy(&copy, a, sizeof copy);
     memcpy(&copy.work, &b->work, sizeof copy.work);
     memcpy(&copy.totals, &b->totals, sizeof copy.totals);
+    memcpy(&copy.evidence, &b->evidence, sizeof copy.evidence); /* of one frame */
     memcpy(&copy.guard, &b->guard, sizeof copy.guard);
     return memcmp(&copy, b, sizeof copy) == 0 && a->totals.diverged_ns == b->totals.diverged_ns;
 }
 
 /* A result that was given is finite; one that was not says why. */
-static bool given(const plr_filter *f, plr_status status, const double *x, unsigned n) {
-    return status == PLR_OK ? all_finite(x, n) : status == PLR_E_DIVERGED && f->diverged;
+static bool given(plr_status status, const double *x, unsigned n) {
+    return status == PLR_OK && all_finite(x, n);
 }
 
 bool specimen_gives_finite_numbers(plr_filter *f) {
@@ -242,17 +244,17 @@ bool specimen_gives_finite_numbers(plr_filter *f) {
     double P[36], b[6];
     bool good =
         plr_filter_pose(f, &pose) == PLR_OK && all_finite(pose.R, 9) && all_finite(pose.p, 3);
-    good &= given(f, plr_filter_pose_covariance(f, P), P, 36);
+    good &= given(plr_filter_pose_covariance(f, P), P, 36);
     good &= plr_filter_velocity(f, &velocity) == PLR_OK && all_finite(velocity.v_B_mps, 3) &&
             all_finite(velocity.w_B_radps, 3);
-    good &= given(f, plr_filter_velocity_covariance(f, P), P, 36);
+    good &= given(plr_filter_velocity_covariance(f, P), P, 36);
     good &= plr_filter_bias(f, b, NULL) == PLR_OK && all_finite(b, 6);
-    good &= given(f, plr_filter_bias(f, b, P), P, 36);
+    good &= given(plr_filter_bias(f, b, P), P, 36);
     const double trace = plr_filter_trace(f);
-    good &= f->diverged || isfinite(trace);
+    good &= isfinite(trace);
     for (unsigned slot = 0; slot < plr_filter_landmark_count(f); slot++) {
         const plr_status status = plr_filter_landmark(f, slot, &landmark);
-        good &= given(f, status, landmark.p_W_m, 3) && given(f, status, landmark.P_W_m2, 9);
+        good &= given(status, landmark.p_W_m, 3) && given(status, landmark.P_W_m2, 9);
     }
     return good;
 }

@@ -53,17 +53,19 @@ bool state_bytes_same(const state_bytes *a, const state_bytes *b) {
 
 bool state_bytes_same_filter(const plr_filter *a, const plr_filter *b) {
     static plr_filter copy;
-    const unsigned n = plr_covariance_dim(a);
+    const unsigned n = plr_covariance_dim(&a->belief);
     const size_t P = plr_packed_row(n);
-    if (a->count != b->count)
+    if (a->belief.count != b->belief.count)
         return false;
     memcpy(&copy, a, sizeof copy);
     memcpy(&copy.work, &b->work, sizeof copy.work);
+    memcpy(&copy.evidence, &b->evidence, sizeof copy.evidence); /* of one frame */
     memcpy(&copy.guard, &b->guard, sizeof copy.guard);
-    memcpy(copy.slots + a->count, b->slots + a->count,
-           (PLR_MAX_LANDMARKS - a->count) * sizeof *copy.slots);
-    memcpy(copy.P + P, b->P + P, (PLR_PACKED_SIZE - P) * sizeof *copy.P);
+    memcpy(copy.belief.slots + a->belief.count, b->belief.slots + a->belief.count,
+           (PLR_MAX_LANDMARKS - a->belief.count) * sizeof *copy.belief.slots);
+    memcpy(copy.belief.P + P, b->belief.P + P, (PLR_PACKED_SIZE - P) * sizeof *copy.belief.P);
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
-        memcpy(copy.S[k] + n, b->S[k] + n, (PLR_MAX_LD - n) * sizeof *copy.S[k]);
+        memcpy(copy.belief.S[k] + n, b->belief.S[k] + n,
+               (PLR_MAX_LD - n) * sizeof *copy.belief.S[k]);
     return memcmp(&copy, b, sizeof copy) == 0;
 }

@@ -41,13 +41,13 @@ void twin_make_up_for_rounding(textbook *t, const plr_frame *frame, double round
 
 /* The filter's slot of each of the textbook's landmarks. False if one is missing. */
 static bool match(const textbook *t, const plr_filter *f, unsigned slot_of[PLR_MAX_LANDMARKS]) {
-    if (t->count != f->count)
+    if (t->count != f->belief.count)
         return false;
     for (unsigned i = 0; i < t->count; i++) {
         slot_of[i] = 0;
-        while (slot_of[i] < f->count && f->slots[slot_of[i]].id != t->landmarks[i].id)
+        while (slot_of[i] < f->belief.count && f->belief.slots[slot_of[i]].id != t->landmarks[i].id)
             slot_of[i]++;
-        if (slot_of[i] == f->count)
+        if (slot_of[i] == f->belief.count)
             return false;
     }
     return true;
@@ -57,13 +57,13 @@ static bool match(const textbook *t, const plr_filter *f, unsigned slot_of[PLR_M
 static double *covariance_of(const textbook *t, const plr_filter *f, const unsigned *slot_of) {
     const unsigned n = textbook_dim(t), first = textbook_row(t, 0);
     double *P = specimen_zeros(n, n), *S = specimen_zeros(n, n), *J = specimen_zeros(n, n);
-    unpack_symmetric(P, f->P, n);
+    unpack_symmetric(P, f->belief.P, n);
     for (unsigned i = 0; i < first; i++)
         J[i * n + i] = 1;
     for (unsigned i = 0; i < t->count; i++) {
         double Jw[9], Ji[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
         if (textbook_is_body(t))
-            specimen_chart(f->slots[slot_of[i]].x, Jw, Ji);
+            specimen_chart(f->belief.slots[slot_of[i]].x, Jw, Ji);
         specimen_put(J, n, textbook_row(t, i), first + 3 * slot_of[i], 3, 3, Ji);
     }
     oracle_sandwich(n, n, J, P, S);
@@ -97,7 +97,7 @@ static double distance(const double a[3], const double b[3]) {
 
 static double rotation_gap(const textbook *t, const plr_filter *f) {
     double R[9], M[16] = {0}, inverse[16], product[16], xi[6];
-    to_doubles(R, f->R_WB, 9);
+    to_doubles(R, f->belief.R_WB, 9);
     for (int i = 0; i < 9; i++)
         M[4 * (i / 3) + i % 3] = R[i];
     M[15] = 1;
@@ -114,14 +114,14 @@ bool twin_compare(const textbook *t, const plr_filter *f, twin_gap *gap) {
     if (t->pending != (f->motion.pending == 1) || !match(t, f, slot_of))
         return false;
     const double p[3] = {t->T_WB[3], t->T_WB[7], t->T_WB[11]};
-    gap->position_m = distance(p, f->p_WB);
+    gap->position_m = distance(p, f->belief.p_WB);
     gap->rotation_rad = rotation_gap(t, f);
     double b[6];
-    to_doubles(b, f->bias, 6);
+    to_doubles(b, f->belief.bias, 6);
     gap->bias = largest_difference(t->bias, b, 6);
     for (unsigned i = 0; i < t->count; i++) {
         double x[3], q[3];
-        to_doubles(x, f->slots[slot_of[i]].x, 3);
+        to_doubles(x, f->belief.slots[slot_of[i]].x, 3);
         observe_in_camera(t, i, q);
         gap->landmark = larger(gap->landmark, distance(t->landmarks[i].x, x) / distance(q, origin));
     }
@@ -145,7 +145,7 @@ void twin_demand_same(const textbook *t, const plr_filter *f, double floor, doub
 }
 
 void twin_of_specimen(textbook *t, const plr_filter *f) {
-    const plr_camera *camera = &f->par.camera;
+    const plr_camera *camera = &f->camera.given;
     plr_calibration calibration = {.fx_px = (double)camera->fx,
                                    .fy_px = (double)camera->fy,
                                    .cx_px = (double)camera->cx,

@@ -39,12 +39,12 @@ plr_calibration wrong_camera(const plr_calibration *truth, const double error[ER
 }
 
 void wrong_camera_covariance(const plr_filter *f, double *Sigma) {
-    const plr_calibrated *errors = &f->par.calibrated;
+    const plr_error_columns *errors = &f->camera.errors;
     const unsigned m = errors->count;
     memset(Sigma, 0, m * m * sizeof *Sigma);
     for (unsigned k = 0; k < m; k++) {
-        const plr_real *G = f->calibration.factor + PLR_CALIBRATIONS * k;
-        const double D = (double)(errors->variance[k] * f->calibration.told[k]);
+        const plr_real *G = f->camera.estimate.factor + PLR_CALIBRATIONS * k;
+        const double D = (double)(errors->variance[k] * f->camera.estimate.told[k]);
         for (unsigned i = 0; i <= k; i++)
             for (unsigned j = 0; j <= k; j++)
                 Sigma[m * i + j] += D * (double)G[i] * (double)G[j];
@@ -52,13 +52,13 @@ void wrong_camera_covariance(const plr_filter *f, double *Sigma) {
 }
 
 double wrong_camera_squared_error(const plr_filter *f, const double error[ERRORS]) {
-    const plr_calibrated *errors = &f->par.calibrated;
+    const plr_error_columns *errors = &f->camera.errors;
     const unsigned m = errors->count;
     double Sigma[ERRORS * ERRORS], e[ERRORS], x[ERRORS], sum = 0;
     TEST_ASSERT_EQUAL_UINT(m, errors->estimated);
     wrong_camera_covariance(f, Sigma);
     for (unsigned k = 0; k < m; k++)
-        x[k] = e[k] = (double)f->calibration.moved[k] - error[errors->kind[k]];
+        x[k] = e[k] = (double)f->camera.estimate.moved[k] - error[errors->kind[k]];
     TEST_ASSERT_TRUE(oracle_solve_spd(m, 1, Sigma, x));
     for (unsigned k = 0; k < m; k++)
         sum += x[k] * e[k];

@@ -14,7 +14,7 @@ from pelorus.frames import Header, Kind, Message, Pose, Start, State, StateActio
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.robot.state import restored, saved
-from pelorus.robot.stream import Outcome, Streamer
+from pelorus.robot.stream import Streamer, StreamResult
 from recordings import first_frames
 
 FRAMES, CUT, LOST = 30, 12, 5  # LOST frames come between the save and the reset
@@ -52,7 +52,7 @@ def saved_and_reset(emulator: Emulator, link: Link, messages: list[Message]) -> 
     return kept
 
 
-def told(outcome: Outcome) -> str:
+def told(outcome: StreamResult) -> str:
     return " | ".join(text.text for text in outcome.texts)
 
 

@@ -37,10 +37,10 @@ static void look(plr_time_ns t_ns, double disparity_px) {
 
 /* What the filter holds a point's disparity for: fx b over its depth. */
 static double disparity_of(unsigned slot) {
-    const plr_slot *s = &rig.filter.slots[slot];
+    const plr_slot *s = &rig.filter.belief.slots[slot];
     const double x = (double)s->x[0], y = (double)s->x[1], z = (double)s->x[2];
     const double range = sqrt(x * x + y * y + z * z);
-    const double fx_b = (double)(rig.filter.par.camera.fx * rig.filter.par.camera.baseline);
+    const double fx_b = (double)(rig.filter.camera.given.fx * rig.filter.camera.given.baseline);
     return fx_b * (1 / range + (double)s->beyond) * range / z;
 }
 
@@ -49,7 +49,7 @@ static double mean_disparity(unsigned *negative) {
     *negative = 0;
     for (unsigned slot = 0; slot < POINTS; slot++) {
         sum += disparity_of(slot);
-        *negative += rig.filter.slots[slot].beyond < 0;
+        *negative += rig.filter.belief.slots[slot].beyond < 0;
     }
     return sum / POINTS;
 }

@@ -22,7 +22,7 @@ static void random_rows(plr_rows *rows, bool uses_pose, double *H, unsigned slot
     double unused[18];
     memset(rows, 0, sizeof *rows);
     rows->terms = uses_pose ? 2 : 1;
-    rows->term[0].row = plr_covariance_row(&twin.filter, slot);
+    rows->term[0].row = plr_covariance_row(&twin.filter.belief, slot);
     rows->term[0].columns = 3;
     rows->term[1].columns = 6;
     twin_random(rows->term[1].H, unused, 18);
@@ -33,14 +33,14 @@ static void random_rows(plr_rows *rows, bool uses_pose, double *H, unsigned slot
 
 static void check_innovation(void) {
     double *H = specimen_zeros(3, twin.n);
-    for (unsigned slot = 0; slot < twin.filter.count; slot++)
+    for (unsigned slot = 0; slot < twin.filter.belief.count; slot++)
         for (int uses_pose = 0; uses_pose < 2; uses_pose++) {
             plr_rows rows_of_H;
             plr_real S[9];
             double dense[9], got[9];
             random_rows(&rows_of_H, uses_pose, H, slot);
             oracle_sandwich(3, twin.n, H, twin.P, dense);
-            plr_covariance_of_rows(&twin.filter, &rows_of_H, S);
+            plr_covariance_of_rows(&twin.filter.belief, &rows_of_H, S);
             to_doubles(got, S, 9);
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(100 * eps, 0, specimen_gap(3, dense, got), twin.at);
         }
@@ -52,15 +52,15 @@ static void test_innovation_covariance_agrees(void) {
 }
 
 static void check_project(void) {
-    const unsigned ld = plr_covariance_ld(&twin.filter);
+    const unsigned ld = plr_covariance_ld(&twin.filter.belief);
     double *H = specimen_zeros(3, twin.n), *HP = specimen_zeros(3, twin.n);
-    for (unsigned slot = 0; slot < twin.filter.count; slot++)
+    for (unsigned slot = 0; slot < twin.filter.belief.count; slot++)
         for (int uses_pose = 0; uses_pose < 2; uses_pose++) {
             plr_rows rows_of_H;
             plr_real *rows = twin.filter.work.Vt;
             random_rows(&rows_of_H, uses_pose, H, slot);
             oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, twin.n, twin.n, 1, H, twin.P, 0, HP);
-            plr_covariance_project(&twin.filter, &rows_of_H, rows, ld);
+            plr_covariance_project(&twin.filter.belief, &rows_of_H, rows, ld);
             for (unsigned r = 0; r < 3; r++) {
                 double scale = 0;
                 for (unsigned j = 0; j < twin.n; j++)
@@ -81,7 +81,7 @@ static void test_projection_on_an_observation_agrees(void) {
 
 /* Fills V^T with rows of which each takes `share` of every variance. */
 static void fill_rows(unsigned depth, double share, double *Vt) {
-    const unsigned ld = plr_covariance_ld(&twin.filter);
+    const unsigned ld = plr_covariance_ld(&twin.filter.belief);
     memset(twin.filter.work.Vt, 0, (size_t)depth * ld * sizeof *twin.filter.work.Vt);
     for (unsigned k = 0; k < depth; k++)
         for (unsigned i = 0; i < twin.n; i++) {
@@ -95,12 +95,13 @@ static void fill_rows(unsigned depth, double share, double *Vt) {
 static void check_subtract(void) {
     double *Vt = specimen_zeros(PLR_BLOCK_ROWS, twin.n);
     for (unsigned depth = 1; depth <= PLR_BLOCK_ROWS; depth += 11) {
-        pack_lower(twin.filter.P, twin.P, twin.n);
+        pack_lower(twin.filter.belief.P, twin.P, twin.n);
         fill_rows(depth, 0.9 / depth, Vt);
         memcpy(twin.expected, twin.P, (size_t)twin.n * twin.n * sizeof *twin.P);
         oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, twin.n, twin.n, depth, -1, Vt, Vt, 1,
                     twin.expected);
-        TEST_ASSERT_TRUE_MESSAGE(plr_covariance_subtract(&twin.filter, depth), twin.at);
+        TEST_ASSERT_TRUE_MESSAGE(
+            plr_covariance_subtract(&twin.filter.belief, twin.filter.work.Vt, depth), twin.at);
         double *got = specimen_covariance(&twin.filter);
         /* against P before: a tenth of the variance is left */
         for (unsigned i = 0; i < twin.n; i++)
@@ -121,16 +122,19 @@ static void check_subtract_refuses(void) {
     double *Vt = specimen_zeros(3, twin.n);
     plr_real *before = malloc(plr_packed_row(twin.n) * sizeof *before);
     TEST_ASSERT_NOT_NULL(before);
-    memcpy(before, twin.filter.P, plr_packed_row(twin.n) * sizeof *before);
-    const unsigned ld = plr_covariance_ld(&twin.filter);
+    memcpy(before, twin.filter.belief.P, plr_packed_row(twin.n) * sizeof *before);
+    const unsigned ld = plr_covariance_ld(&twin.filter.belief);
     for (unsigned i = 0; i < twin.n; i++) {
         fill_rows(3, 0.1, Vt);
         twin.filter.work.Vt[2 * ld + i] = (plr_real)sqrt(0.81 * twin.P[i * twin.n + i]);
-        TEST_ASSERT_FALSE_MESSAGE(plr_covariance_subtract(&twin.filter, 3), twin.at);
+        TEST_ASSERT_FALSE_MESSAGE(
+            plr_covariance_subtract(&twin.filter.belief, twin.filter.work.Vt, 3), twin.at);
         twin.filter.work.Vt[2 * ld + i] = (plr_real)NAN;
-        TEST_ASSERT_FALSE_MESSAGE(plr_covariance_subtract(&twin.filter, 3), twin.at);
+        TEST_ASSERT_FALSE_MESSAGE(
+            plr_covariance_subtract(&twin.filter.belief, twin.filter.work.Vt, 3), twin.at);
     }
-    TEST_ASSERT_TRUE_MESSAGE(same_bits(before, twin.filter.P, plr_packed_row(twin.n)), twin.at);
+    TEST_ASSERT_TRUE_MESSAGE(same_bits(before, twin.filter.belief.P, plr_packed_row(twin.n)),
+                             twin.at);
     free(before);
     free(Vt);
 }
@@ -143,12 +147,14 @@ static void check_subtract_exact_pose(void) {
     double *Vt = specimen_zeros(3, twin.n);
     for (unsigned i = 0; i < 6; i++)
         for (unsigned j = 0; j < twin.n; j++)
-            twin.filter.P[plr_packed_at(i, j)] = 0;
+            twin.filter.belief.P[plr_packed_at(i, j)] = 0;
     fill_rows(3, 0.2, Vt);
     for (unsigned k = 0; k < 3; k++)
-        memset(twin.filter.work.Vt + k * plr_covariance_ld(&twin.filter), 0, 6 * sizeof(plr_real));
-    TEST_ASSERT_TRUE_MESSAGE(plr_covariance_subtract(&twin.filter, 3), twin.at);
-    TEST_ASSERT_TRUE(plr_covariance_is_positive(&twin.filter));
+        memset(twin.filter.work.Vt + k * plr_covariance_ld(&twin.filter.belief), 0,
+               6 * sizeof(plr_real));
+    TEST_ASSERT_TRUE_MESSAGE(plr_covariance_subtract(&twin.filter.belief, twin.filter.work.Vt, 3),
+                             twin.at);
+    TEST_ASSERT_TRUE(plr_covariance_is_positive(&twin.filter.belief));
     free(Vt);
 }
 
@@ -173,12 +179,12 @@ static void check_append(void) {
         oracle_sandwich(twin.n + 3, twin.n, J, twin.P, grown);
         for (unsigned i = 0; i < 9; i++)
             grown[(twin.n + i / 3) * (twin.n + 3) + twin.n + i % 3] += own[i];
-        plr_covariance_append(&twin.filter, &landmark);
-        twin.filter.count++;
+        plr_covariance_append(&twin.filter.belief, &landmark);
+        twin.filter.belief.count++;
         double *got = specimen_covariance(&twin.filter);
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(100 * eps, 0, specimen_gap(twin.n + 3, grown, got),
                                           twin.at);
-        twin.filter.count--;
+        twin.filter.belief.count--;
         free(got);
         free(grown);
         free(J);
@@ -190,21 +196,21 @@ static void test_a_new_landmark_appends_its_rows(void) {
 }
 
 static void check_remove(void) {
-    const unsigned count = twin.filter.count;
+    const unsigned count = twin.filter.belief.count;
     for (unsigned slot = 0; slot < count; slot++) {
-        pack_lower(twin.filter.P, twin.P, twin.n);
-        const unsigned to = plr_covariance_row(&twin.filter, slot);
-        plr_covariance_remove(&twin.filter, slot);
-        twin.filter.count--;
+        pack_lower(twin.filter.belief.P, twin.P, twin.n);
+        const unsigned to = plr_covariance_row(&twin.filter.belief, slot);
+        plr_covariance_remove(&twin.filter.belief, slot);
+        twin.filter.belief.count--;
         /* the last landmark's rows stand where the removed one's stood */
         for (unsigned i = 0; i < twin.n - 3; i++)
             for (unsigned j = 0; j <= i; j++) {
                 const unsigned a = i >= to && i < to + 3 ? twin.n - 3 + (i - to) : i;
                 const unsigned b = j >= to && j < to + 3 ? twin.n - 3 + (j - to) : j;
                 TEST_ASSERT_EQUAL_DOUBLE(twin.P[a * twin.n + b],
-                                         (double)twin.filter.P[plr_packed_at(i, j)]);
+                                         (double)twin.filter.belief.P[plr_packed_at(i, j)]);
             }
-        twin.filter.count++;
+        twin.filter.belief.count++;
     }
 }
 

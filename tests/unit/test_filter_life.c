@@ -196,18 +196,18 @@ static void test_reset_gives_the_filter_of_the_first_day(void) {
     rig.world = start;
     memcpy(&rig.filter, &second, sizeof rig.filter);
     rig_drive(5);
-    const unsigned n = 12 + 3 * rig.filter.count;
-    TEST_ASSERT_EQUAL_UINT(rig.before.count, rig.filter.count);
-    TEST_ASSERT_TRUE(same_bits(rig.before.P, rig.filter.P, n * (n + 1) / 2));
-    TEST_ASSERT_TRUE(same_bits(rig.before.R_WB, rig.filter.R_WB, 9));
-    TEST_ASSERT_EQUAL_MEMORY(rig.before.p_WB, rig.filter.p_WB, sizeof rig.filter.p_WB);
+    const unsigned n = 12 + 3 * rig.filter.belief.count;
+    TEST_ASSERT_EQUAL_UINT(rig.before.belief.count, rig.filter.belief.count);
+    TEST_ASSERT_TRUE(same_bits(rig.before.belief.P, rig.filter.belief.P, n * (n + 1) / 2));
+    TEST_ASSERT_TRUE(same_bits(rig.before.belief.R_WB, rig.filter.belief.R_WB, 9));
+    TEST_ASSERT_EQUAL_MEMORY(rig.before.belief.p_WB, rig.filter.belief.p_WB,
+                             sizeof rig.filter.belief.p_WB);
     TEST_ASSERT_EQUAL_MEMORY(&rig.before.totals, &rig.filter.totals, sizeof rig.filter.totals);
 }
 
 static void test_reset_heals_a_diverged_filter(void) {
     rig_drive(5);
-    rig.filter.diverged = 1;
-    reseal(&rig.filter);
+    spoil_covariance(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&rig.filter));
     setUp();
     rig_drive(5); /* demands PLR_OK of every frame */

@@ -172,8 +172,9 @@ static void test_readings_touch_neither_landmarks_nor_covariance(void) {
     rig_remember();
     for (int k = 0; k < 50; k++)
         rig_twist();
-    TEST_ASSERT_EQUAL_MEMORY(rig.before.P, rig.filter.P, sizeof rig.filter.P);
-    TEST_ASSERT_EQUAL_MEMORY(rig.before.slots, rig.filter.slots, sizeof rig.filter.slots);
+    TEST_ASSERT_EQUAL_MEMORY(rig.before.belief.P, rig.filter.belief.P, sizeof rig.filter.belief.P);
+    TEST_ASSERT_EQUAL_MEMORY(rig.before.belief.slots, rig.filter.belief.slots,
+                             sizeof rig.filter.belief.slots);
     TEST_ASSERT_EQUAL_UINT32(rig.before.totals.twists + 50, rig.filter.totals.twists);
 }
 

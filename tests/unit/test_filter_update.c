@@ -37,7 +37,7 @@ static void demand_sums(void) {
                                                 r->poor + r->no_room);
     TEST_ASSERT_EQUAL_UINT(r->matched, r->used + r->gated + r->left_out);
     TEST_ASSERT_EQUAL_UINT(4 * (r->matched - r->gated), r->nis_dof);
-    TEST_ASSERT_EQUAL_UINT(rig.filter.count, r->active);
+    TEST_ASSERT_EQUAL_UINT(rig.filter.belief.count, r->active);
 }
 
 /* ---------------------------------------------------------------- refusals */
@@ -48,7 +48,7 @@ static void demand_refused_frame(plr_status expected, const plr_frame *frame) {
     TEST_ASSERT_EQUAL_INT(expected, rig.report.status);
     TEST_ASSERT_EQUAL_UINT64(frame->t_ns, rig.report.t_ns);
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, rig.report.health);
-    TEST_ASSERT_EQUAL_UINT16(rig.filter.count, rig.report.active);
+    TEST_ASSERT_EQUAL_UINT16(rig.filter.belief.count, rig.report.active);
     TEST_ASSERT_EQUAL_UINT16(0, rig.report.used);
 }
 
@@ -204,7 +204,7 @@ static void test_counts_add_up_through_a_drive(void) {
     TEST_ASSERT_EQUAL_UINT64(sum.gated, t->gated);
     TEST_ASSERT_EQUAL_UINT64(sum.created, t->created);
     TEST_ASSERT_EQUAL_UINT64(sum.evicted, t->evicted);
-    TEST_ASSERT_EQUAL_UINT64(t->created, t->evicted + rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT64(t->created, t->evicted + rig.filter.belief.count);
     TEST_ASSERT_EQUAL_UINT32(60, t->frames);
     TEST_ASSERT_EQUAL_UINT32(600, t->twists);
     TEST_ASSERT_GREATER_THAN_UINT(0, sum.gated);
@@ -236,17 +236,18 @@ static void test_a_gated_observation_moves_nothing(void) {
     rig_remember();
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(rig.report.matched, rig.report.gated);
-    TEST_ASSERT_TRUE(same_bits(rig.before.R_WB, rig.filter.R_WB, 9));
-    TEST_ASSERT_EQUAL_MEMORY(rig.before.p_WB, rig.filter.p_WB, sizeof rig.filter.p_WB);
-    const unsigned n = plr_covariance_dim(&rig.before);
-    TEST_ASSERT_TRUE(same_bits(rig.before.P, rig.filter.P, n * (n + 1) / 2));
+    TEST_ASSERT_TRUE(same_bits(rig.before.belief.R_WB, rig.filter.belief.R_WB, 9));
+    TEST_ASSERT_EQUAL_MEMORY(rig.before.belief.p_WB, rig.filter.belief.p_WB,
+                             sizeof rig.filter.belief.p_WB);
+    const unsigned n = plr_covariance_dim(&rig.before.belief);
+    TEST_ASSERT_TRUE(same_bits(rig.before.belief.P, rig.filter.belief.P, n * (n + 1) / 2));
 }
 
 static void test_dead_reckoning_looks_at_nothing(void) {
     rig.config.mode = PLR_MODE_DEAD_RECKONING;
     rig_begin();
     rig_drive(5);
-    TEST_ASSERT_EQUAL_UINT(0, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(0, rig.filter.belief.count);
     TEST_ASSERT_GREATER_THAN_UINT(0, rig.report.observations);
     TEST_ASSERT_EQUAL_UINT(0, rig.report.matched + rig.report.created + rig.report.poor);
     TEST_ASSERT_EQUAL_UINT32(5, rig.filter.totals.frames);
@@ -271,7 +272,7 @@ static void test_mapping_wants_the_pose_of_the_frames_own_time(void) {
 
 static double spread_of_landmarks(void) {
     double sum = 0;
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         plr_landmark landmark;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&rig.filter, slot, &landmark));
         sum += landmark.P_W_m2[0] + landmark.P_W_m2[4] + landmark.P_W_m2[8];
@@ -305,7 +306,7 @@ static void test_a_budget_is_kept_and_the_rest_counted(void) {
 }
 
 /* The ones that tell most: those of the largest det(S). */
-static void test_a_budget_takes_the_largest_gains(void) {
+static void test_a_budget_takes_those_of_the_largest_det_S(void) {
     enum { BUDGET = 5 };
     double gain[SCENE_MAX_SEEN], least_used = (double)INFINITY, most_left = 0;
     rig_drive(5);
@@ -314,17 +315,19 @@ static void test_a_budget_takes_the_largest_gains(void) {
     (void)plr_filter_trace(&rig.filter);
     for (unsigned i = 0; i < frame.count; i++) {
         gain[i] = 0;
-        for (unsigned slot = 0; slot < rig.filter.count; slot++)
-            if (rig.filter.slots[slot].id == seen[i].id) {
+        for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+            if (rig.filter.belief.slots[slot].id == seen[i].id) {
                 const plr_verdict verdict = specimen_judge(&rig.filter, slot, &seen[i]);
-                gain[i] = verdict.accepted ? (double)verdict.gain : 0;
+                gain[i] = verdict.accepted ? (double)verdict.det_S : 0;
             }
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(BUDGET, rig.report.used);
     bool is_used[SCENE_MAX_SEEN] = {false};
-    for (unsigned k = 0; k < BUDGET; k++)
-        is_used[rig.filter.work.order[rig.filter.work.used[k]]] = true;
+    for (unsigned k = 0; k < rig.filter.work.sightings.count; k++) {
+        const plr_sighting *row = &rig.filter.work.sightings.at[k];
+        is_used[row->seen - seen] = row->used;
+    }
     for (unsigned i = 0; i < frame.count; i++) {
         if (is_used[i] && gain[i] < least_used)
             least_used = gain[i];
@@ -341,7 +344,7 @@ static void test_a_budget_takes_the_largest_gains(void) {
  * what it sees, and says all of it; the frames after it are used as ever. */
 static void demand_recovery(const plr_frame *frame) {
     double P[36];
-    const unsigned active = rig.filter.count;
+    const unsigned active = rig.filter.belief.count;
     const plr_totals totals = rig.filter.totals;
     const plr_pose before = pose_of(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(frame));
@@ -354,7 +357,7 @@ static void demand_recovery(const plr_frame *frame) {
     TEST_ASSERT_EQUAL_UINT32(totals.widened + 1, rig.filter.totals.widened);
     TEST_ASSERT_EQUAL_UINT32(totals.refused, rig.filter.totals.refused);
     TEST_ASSERT_GREATER_THAN_UINT(3, rig.report.created);
-    TEST_ASSERT_EQUAL_UINT(rig.report.created, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(rig.report.created, rig.filter.belief.count);
     TEST_ASSERT_GREATER_THAN_UINT(3, active);
     const plr_pose after = pose_of(&rig.filter);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 0, largest_difference(before.p, after.p, 3));
@@ -366,7 +369,7 @@ static void demand_recovery(const plr_frame *frame) {
 
 static void test_a_diverged_filter_recovers_in_the_same_frame_and_goes_on(void) {
     rig_drive(5);
-    rig.filter.P[plr_packed_at(0, 0)] = PLR_R(-1e3);
+    rig.filter.belief.P[plr_packed_at(0, 0)] = PLR_R(-1e3);
     reseal(&rig.filter);
     rig_twist();
     const plr_time_ns when = rig.world.t_ns;
@@ -390,9 +393,9 @@ static void test_an_update_that_loses_a_variance_recovers_too(void) {
     rig_drive(5);
     (void)plr_filter_trace(&rig.filter);
     const plr_frame frame = look();
-    const unsigned row = plr_covariance_row(&rig.filter, 0);
+    const unsigned row = plr_covariance_row(&rig.filter.belief, 0);
     for (unsigned i = 0; i < 3; i++)
-        rig.filter.P[plr_packed_at(row + i, 0)] = PLR_R(10); /* correlated beyond 1 */
+        rig.filter.belief.P[plr_packed_at(row + i, 0)] = PLR_R(10); /* correlated beyond 1 */
     reseal(&rig.filter);
     demand_recovery(&frame);
 }

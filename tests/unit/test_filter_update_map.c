@@ -52,8 +52,8 @@ static plr_status update(const plr_frame *frame) {
 }
 
 static bool holds(uint32_t id) {
-    for (unsigned slot = 0; slot < rig.filter.count; slot++)
-        if (rig.filter.slots[slot].id == id)
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+        if (rig.filter.belief.slots[slot].id == id)
             return true;
     return false;
 }
@@ -211,12 +211,12 @@ static void test_a_full_ring_hands_the_oldest_to_the_sink(void) {
     }
     TEST_ASSERT_GREATER_THAN_UINT(0, handed_over);
     TEST_ASSERT_EQUAL_UINT(handed_over, rig.report.evicted);
-    TEST_ASSERT_EQUAL_UINT(10, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(10, rig.filter.belief.count);
     /* none that stayed was unseen for longer than the one that left */
     const plr_time_ns left = handed[0].last_seen_ns;
     TEST_ASSERT_FALSE(holds(handed[0].id));
-    for (unsigned slot = 0; slot < rig.filter.count; slot++)
-        TEST_ASSERT_TRUE(rig.filter.slots[slot].last_seen_ns >= left);
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+        TEST_ASSERT_TRUE(rig.filter.belief.slots[slot].last_seen_ns >= left);
     /* and it left with its place in the world, which `body` keeps by the camera */
     const double *truth = scene_landmark(&rig.world, handed[0].id);
     for (int i = 0; i < 3; i++)
@@ -256,7 +256,7 @@ static void test_an_id_that_returns_is_a_new_landmark(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(0, rig.report.matched);
     TEST_ASSERT_EQUAL_UINT(1, rig.report.created);
-    TEST_ASSERT_EQUAL_UINT32(1, rig.filter.slots[0].times_seen);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.filter.belief.slots[0].times_seen);
 }
 
 /* ---------------------------------------------------------------- the locked gate */
@@ -289,7 +289,7 @@ static void test_a_locked_gate_drops_what_it_rejects_and_keeps_the_pose(void) {
     begin_with_ten_landmarks();
     lock_gate(9, PLR_NO_BUDGET);
     TEST_ASSERT_EQUAL_UINT(8, rig.report.gated);
-    TEST_ASSERT_EQUAL_UINT(10, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(10, rig.filter.belief.count);
     TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_GATE_LOCKED);
     lock_gate(1, PLR_NO_BUDGET);
     TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_GATE_LOCKED);
@@ -297,12 +297,13 @@ static void test_a_locked_gate_drops_what_it_rejects_and_keeps_the_pose(void) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.filter.totals.locks);
     TEST_ASSERT_EQUAL_UINT(0, handed_over); /* they were wrong: the map does not want them */
     TEST_ASSERT_TRUE(holds(seen[0].id) && holds(seen[1].id));
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
-        const bool kept =
-            rig.filter.slots[slot].id == seen[0].id || rig.filter.slots[slot].id == seen[1].id;
-        TEST_ASSERT_EQUAL_UINT32(kept ? 11 : 1, rig.filter.slots[slot].times_seen);
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
+        const bool kept = rig.filter.belief.slots[slot].id == seen[0].id ||
+                          rig.filter.belief.slots[slot].id == seen[1].id;
+        TEST_ASSERT_EQUAL_UINT32(kept ? 11 : 1, rig.filter.belief.slots[slot].times_seen);
     }
-    TEST_ASSERT_EQUAL_UINT(rig.report.created + 2, rig.filter.count); /* anew, where they can be */
+    TEST_ASSERT_EQUAL_UINT(rig.report.created + 2,
+                           rig.filter.belief.count); /* anew, where they can be */
     double P[36];
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
     TEST_ASSERT_GREATER_THAN_DOUBLE(0, P[0]);
@@ -314,9 +315,10 @@ static void test_a_locked_gate_keeps_what_the_budget_left_out(void) {
     TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_GATE_LOCKED);
     TEST_ASSERT_EQUAL_UINT(1, rig.report.left_out);
     TEST_ASSERT_TRUE(holds(seen[0].id) && holds(seen[1].id));
-    for (unsigned slot = 0; slot < rig.filter.count; slot++)
-        if (rig.filter.slots[slot].id == seen[0].id || rig.filter.slots[slot].id == seen[1].id)
-            TEST_ASSERT_EQUAL_UINT32(11, rig.filter.slots[slot].times_seen);
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+        if (rig.filter.belief.slots[slot].id == seen[0].id ||
+            rig.filter.belief.slots[slot].id == seen[1].id)
+            TEST_ASSERT_EQUAL_UINT32(11, rig.filter.belief.slots[slot].times_seen);
 }
 
 static void test_an_open_gate_is_reported_as_inert_after_a_thousand_matches(void) {
@@ -358,7 +360,7 @@ static void test_localization_takes_its_landmarks_from_the_map_alone(void) {
     TEST_ASSERT_EQUAL_UINT(even, rig.report.matched); /* and used at once */
     TEST_ASSERT_EQUAL_UINT(frame.count - even, rig.report.poor);
     TEST_ASSERT_EQUAL_UINT(0, rig.report.no_room);
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         plr_landmark landmark;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&rig.filter, slot, &landmark));
         TEST_ASSERT_TRUE(landmark.known);
@@ -392,8 +394,9 @@ static void test_slam_asks_the_map_only_if_told_to(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(frame.count, rig.report.created); /* both kinds, side by side */
     TEST_ASSERT_EQUAL_UINT(even_ids(&frame), rig.report.matched);
-    for (unsigned slot = 0; slot < rig.filter.count; slot++)
-        TEST_ASSERT_EQUAL_UINT8(rig.filter.slots[slot].id % 2 == 0, rig.filter.slots[slot].known);
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+        TEST_ASSERT_EQUAL_UINT8(rig.filter.belief.slots[slot].id % 2 == 0,
+                                rig.filter.belief.slots[slot].known);
 }
 
 /* Each observation stands in one count: a new id either found a slot, or had no room, or is unknown. */
@@ -431,7 +434,7 @@ static void test_a_source_that_says_yes_and_gives_nothing_gives_no_landmark(void
     rig_begin();
     const plr_frame frame = look();
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
-    TEST_ASSERT_EQUAL_UINT(0, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(0, rig.filter.belief.count);
 }
 
 static void test_a_map_entry_that_is_none_is_not_taken(void) {
@@ -439,7 +442,7 @@ static void test_a_map_entry_that_is_none_is_not_taken(void) {
     begin_with_map(PLR_MODE_LOCALIZATION, false);
     plr_frame frame = look();
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
-    TEST_ASSERT_EQUAL_UINT(0, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(0, rig.filter.belief.count);
     TEST_ASSERT_EQUAL_UINT(frame.count, rig.report.poor);
 
     begin_with_map(PLR_MODE_SLAM, true); /* where the pixels do instead */

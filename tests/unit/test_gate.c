@@ -36,15 +36,15 @@ static void test_innovation_is_seen_minus_predicted(void) {
 }
 
 static void test_the_vertical_row_is_a_mean_of_two(void) {
-    filter.par.pixel_variance = PLR_R(9);
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter, 0));
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter, 1));
-    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_stereo_variance(&filter, 2));
+    filter.camera.pixel_variance = PLR_R(9);
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter.camera, 0));
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter.camera, 1));
+    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_stereo_variance(&filter.camera, 2));
 }
 
 /* S = H P H^T + R of a slot, 3x3, and r, in double. */
 static void dense_innovation(unsigned slot, const plr_observation *seen, double S[9], double r[3]) {
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     const plr_measurement m = specimen_measurement(&filter, slot, seen);
     double *H = specimen_zeros(3, n), *P = specimen_covariance(&filter);
     specimen_put_rows(H, n, &m.H);
@@ -75,11 +75,11 @@ static void check_model(plr_model_kind model) {
             TEST_ASSERT_TRUE(oracle_solve_spd(3, 1, S, y));
             const double gap = (double)seen.vL_px - (double)seen.vR_px;
             const double d2 = r[0] * y[0] + r[1] * y[1] + r[2] * y[2] +
-                              gap * gap / (2 * (double)filter.par.pixel_variance);
+                              gap * gap / (2 * (double)filter.camera.pixel_variance);
             const plr_verdict verdict = specimen_judge(&filter, slot, &seen);
             /* S holds variances of up to 1000 px^2 beside 2: a thousand roundings */
             TEST_ASSERT_DOUBLE_WITHIN(d2 * 3000 * eps, d2, (double)verdict.d2);
-            TEST_ASSERT_DOUBLE_WITHIN(gain * 3000 * eps, gain, (double)verdict.gain);
+            TEST_ASSERT_DOUBLE_WITHIN(gain * 3000 * eps, gain, (double)verdict.det_S);
             TEST_ASSERT_TRUE(verdict.accepted); /* the specimen's gate is off */
         }
     }
@@ -136,10 +136,10 @@ static void test_the_course_gate_when_open_looks_at_the_covariance_too(void) {
 static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
-    filter.slots[3].x[2] = PLR_R(0.2);
+    filter.belief.slots[3].x[2] = PLR_R(0.2);
     const plr_verdict verdict = specimen_judge(&filter, 3, &seen);
     TEST_ASSERT_FALSE(verdict.accepted);
-    TEST_ASSERT_TRUE(isfinite((double)verdict.d2) && isfinite((double)verdict.gain));
+    TEST_ASSERT_TRUE(isfinite((double)verdict.d2) && isfinite((double)verdict.det_S));
 }
 
 /* A sigma of more than a focal length in the image is no basis for a linearisation, unless the place
@@ -147,22 +147,22 @@ static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
 static void test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmarks(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
-    const unsigned row = plr_covariance_row(&filter, 3);
+    const unsigned row = plr_covariance_row(&filter.belief, 3);
     for (unsigned i = row; i < row + 2; i++)
-        filter.P[plr_packed_at(i, i)] = PLR_R(9); /* 3 rad of bearing */
+        filter.belief.P[plr_packed_at(i, i)] = PLR_R(9); /* 3 rad of bearing */
     TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);
-    filter.slots[3].known = 1;
+    filter.belief.slots[3].known = 1;
     TEST_ASSERT_TRUE(specimen_judge(&filter, 3, &seen).accepted);
 }
 
 static void test_an_innovation_covariance_that_is_not_positive_is_rejected(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
-    const unsigned row = plr_covariance_row(&filter, 3);
+    const unsigned row = plr_covariance_row(&filter.belief, 3);
     for (unsigned i = row; i < row + 3; i++)
-        filter.P[plr_packed_at(i, i)] = PLR_R(-1);
+        filter.belief.P[plr_packed_at(i, i)] = PLR_R(-1);
     TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);
-    filter.P[plr_packed_at(row, row)] = (plr_real)NAN;
+    filter.belief.P[plr_packed_at(row, row)] = (plr_real)NAN;
     TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);
 }
 

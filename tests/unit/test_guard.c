@@ -62,19 +62,19 @@ static void demand_found(size_t from, size_t to) {
 }
 
 static void test_every_flipped_bit_of_what_outlives_a_call_is_found(void) {
-    const size_t P = offsetof(plr_filter, P);
+    const size_t P = offsetof(plr_filter, belief.P);
     demand_found(0, sizeof sound.magic);
-    demand_found(offsetof(plr_filter, config),
-                 offsetof(plr_filter, slots) + sound.count * sizeof *sound.slots);
-    demand_found(P, P + plr_packed_row(12 + 3 * sound.count) * sizeof *sound.P);
-    demand_found(offsetof(plr_filter, supervisor), offsetof(plr_filter, either));
-    demand_found(offsetof(plr_filter, core_motion), sizeof sound);
+    demand_found(offsetof(plr_filter, config), offsetof(plr_filter, source.either));
+    demand_found(offsetof(plr_filter, motion), offsetof(plr_filter, belief.slots) +
+                                                   sound.belief.count * sizeof *sound.belief.slots);
+    demand_found(P, P + plr_packed_row(12 + 3 * sound.belief.count) * sizeof *sound.belief.P);
+    demand_found(offsetof(plr_filter, supervisor), sizeof sound);
 }
 
 static void test_what_no_call_looks_at_may_be_changed(void) {
     const plr_pose before = pose_of(&rig.filter);
     memset(&rig.filter.work, 0xA5, sizeof rig.filter.work);
-    memset(rig.filter.slots + sound.count, 0xA5, sizeof *sound.slots);
+    memset(rig.filter.belief.slots + sound.belief.count, 0xA5, sizeof *sound.belief.slots);
     const plr_pose after = pose_of(&rig.filter);
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
     rig_drive(3);
@@ -83,7 +83,7 @@ static void test_what_no_call_looks_at_may_be_changed(void) {
 /* Which a plain sum would not see: neighbours, and words that enter the same of the sums side by side. */
 static void test_words_that_change_places_are_found(void) {
     const plr_frame nothing = {.t_ns = rig.world.t_ns, .budget = PLR_NO_BUDGET};
-    plr_real *P = rig.filter.P + 60;
+    plr_real *P = rig.filter.belief.P + 60;
     for (unsigned apart = 1; apart <= 16; apart++) {
         const plr_real x = P[0], y = P[apart];
         TEST_ASSERT_FALSE(x <= y && x >= y);
@@ -136,7 +136,7 @@ static void demand_refusals(void) {
 }
 
 static void test_a_damaged_pose_is_not_given_and_a_reset_mends_it(void) {
-    rig.filter.p_WB[1] += 1;
+    rig.filter.belief.p_WB[1] += 1;
     demand_refusals();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&rig.filter));
     const plr_pose pose = pose_of(&rig.filter);
@@ -144,9 +144,9 @@ static void test_a_damaged_pose_is_not_given_and_a_reset_mends_it(void) {
 }
 
 static void test_a_count_beyond_the_slots_leads_no_call_out_of_bounds(void) {
-    rig.filter.count = 0x40000000;
+    rig.filter.belief.count = 0x40000000;
     demand_refusals();
-    rig.filter.count = sound.count;
+    rig.filter.belief.count = sound.belief.count;
     rig.filter.config.slots = 0xFFFF;
     rig.filter.totals.damaged = sound.totals.damaged;
     demand_refusals();
@@ -167,15 +167,15 @@ static void test_a_sink_that_points_elsewhere_is_not_called(void) {
 }
 
 static void test_numbers_that_no_pose_has_are_damage_even_under_a_right_sum(void) {
-    rig.filter.R_WB[4] = (plr_real)NAN;
+    rig.filter.belief.R_WB[4] = (plr_real)NAN;
     plr_guard_seal_whole(&rig.filter);
     demand_refusals();
     memcpy(&rig.filter, &sound, sizeof sound);
-    rig.filter.R_WB[4] *= PLR_R(1.01);
+    rig.filter.belief.R_WB[4] *= PLR_R(1.01);
     plr_guard_seal_whole(&rig.filter);
     demand_refusals();
     memcpy(&rig.filter, &sound, sizeof sound);
-    rig.filter.p_WB[0] = (double)INFINITY;
+    rig.filter.belief.p_WB[0] = (double)INFINITY;
     plr_guard_seal_whole(&rig.filter);
     demand_refusals();
 }

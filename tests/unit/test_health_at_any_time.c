@@ -101,7 +101,7 @@ static void test_a_camera_that_sees_nothing_is_told_too(void) {
 /* Readings came every 10 ms: three of them and 50 ms more may be missing. */
 static void test_an_odometry_that_falls_silent_is_told(void) {
     rig_drive(5);
-    const plr_time_ns last = rig.filter.reading_ns;
+    const plr_time_ns last = rig.filter.source.reading_ns;
     ask(last + 79000000);
     TEST_ASSERT_FALSE(state.reasons & PLR_REASON_NO_TWISTS);
     ask(last + 81000000);

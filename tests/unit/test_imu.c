@@ -204,7 +204,7 @@ static void step_all(void) {
     for (unsigned k = 0; k < READINGS; k++) {
         plr_real reading[6];
         to_reals(reading, real.reading[k], 6);
-        held_step(&plr_process_imu, &filter, filter.t_ns + 2500000, reading, (plr_real)tau,
+        held_step(&plr_process_imu, &filter, filter.belief.t_ns + 2500000, reading, (plr_real)tau,
                   (plr_real)tau);
     }
     reseal(&filter);
@@ -263,7 +263,7 @@ static void test_derivatives_by_tilt_velocity_and_biases_are_those_of_the_motion
     }
     step_all();
     to_doubles(got, filter.motion.B, 6 * DRIVER);
-    to_doubles(got + 6 * DRIVER, filter.core_motion.V, 3 * DRIVER);
+    to_doubles(got + 6 * DRIVER, filter.motion.core.V, 3 * DRIVER);
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 4; c++) {
             char at[32];
@@ -274,11 +274,12 @@ static void test_derivatives_by_tilt_velocity_and_biases_are_those_of_the_motion
 }
 
 static void test_a_shift_and_a_turn_about_the_vertical_drive_nothing(void) {
-    const double up[3] = {(double)filter.R_WB[6], (double)filter.R_WB[7], (double)filter.R_WB[8]};
+    const double up[3] = {(double)filter.belief.R_WB[6], (double)filter.belief.R_WB[7],
+                          (double)filter.belief.R_WB[8]};
     step_all();
     for (int r = 0; r < ERROR; r++) {
         const plr_real *row =
-            r < 6 ? filter.motion.B + DRIVER * r : filter.core_motion.V + DRIVER * (r - 6);
+            r < 6 ? filter.motion.B + DRIVER * r : filter.motion.core.V + DRIVER * (r - 6);
         double sum = 0, size = 1e-3;
         for (int i = 0; i < 3; i++) {
             sum += (double)row[i] * up[i];
@@ -317,8 +318,8 @@ static double filters_noise(int i, int j) {
     if (j < 6)
         return (double)filter.motion.Q[6 * i + j];
     if (i < 6)
-        return (double)filter.core_motion.Q_nc[PLR_REST_DIM * i + j - 6];
-    return (double)filter.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
+        return (double)filter.motion.core.Q_nc[PLR_REST_DIM * i + j - 6];
+    return (double)filter.motion.core.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
 }
 
 /* The specific force that the body feels where it is, and a push that is less than its weight. */
@@ -350,15 +351,16 @@ static double density_of_a_step(double mps2) {
     static plr_filter once;
     plr_real reading[6];
     once = filter;
-    memset(once.inertial.velocity, 0, sizeof once.inertial.velocity); /* what a turn adds */
+    memset(once.belief.velocity, 0, sizeof once.belief.velocity); /* what a turn adds */
     double force[6] = {mps2, 0, 0};
     for (int i = 0; i < 3; i++) {
         force[i] += gravity * real.T[8 + i] + real.bias[i];
         force[3 + i] = real.bias[3 + i];
     }
     to_reals(reading, force, 6);
-    held_step(&plr_process_imu, &once, once.t_ns + 2500000, reading, PLR_R(0.0025), PLR_R(0.0025));
-    return (double)once.core_motion.Q_cc[0] / tau;
+    held_step(&plr_process_imu, &once, once.belief.t_ns + 2500000, reading, PLR_R(0.0025),
+              PLR_R(0.0025));
+    return (double)once.motion.core.Q_cc[0] / tau;
 }
 
 static void test_a_force_of_more_than_the_bodys_weight_is_a_shock_and_not_believed(void) {
@@ -366,9 +368,9 @@ static void test_a_force_of_more_than_the_bodys_weight_is_a_shock_and_not_believ
     TEST_ASSERT_DOUBLE_WITHIN(1e-2 * stated, stated, density_of_a_step(0.9 * gravity));
     const double due = stated + 0.5 * (23.0 * 23.0 - gravity * gravity);
     TEST_ASSERT_DOUBLE_WITHIN(2e-3 * due, due, density_of_a_step(23));
-    filter.inertial.scatter2[0] =
+    filter.source.inertial.scatter2[0] =
         PLR_R(40); /* a body that is shaken: 30 times that is more than 23^2 */
-    filter.inertial.usual_s = PLR_R(0.0025);
+    filter.source.inertial.usual_s = PLR_R(0.0025);
     const double shaken = 40 * 0.0025;
     TEST_ASSERT_DOUBLE_WITHIN(2e-3 * shaken, shaken, density_of_a_step(23));
 }
@@ -376,7 +378,7 @@ static void test_a_force_of_more_than_the_bodys_weight_is_a_shock_and_not_believ
 static void test_noise_is_symmetric_to_the_bit(void) {
     step_all();
     TEST_ASSERT_TRUE(is_symmetric(filter.motion.Q, 6));
-    TEST_ASSERT_TRUE(is_symmetric(filter.core_motion.Q_cc, PLR_REST_DIM));
+    TEST_ASSERT_TRUE(is_symmetric(filter.motion.core.Q_cc, PLR_REST_DIM));
 }
 
 static void test_parts_of_an_interval_add_up_to_the_whole(void) {
@@ -384,15 +386,16 @@ static void test_parts_of_an_interval_add_up_to_the_whole(void) {
     plr_real reading[6];
     to_reals(reading, real.reading[0], 6);
     whole = filter;
-    held_step(&plr_process_imu, &whole, whole.t_ns + 4000000, reading, PLR_R(0.004), PLR_R(0.004));
-    held_step(&plr_process_imu, &filter, filter.t_ns + 1000000, reading, PLR_R(0.001),
+    held_step(&plr_process_imu, &whole, whole.belief.t_ns + 4000000, reading, PLR_R(0.004),
               PLR_R(0.004));
-    held_step(&plr_process_imu, &filter, filter.t_ns + 3000000, reading, PLR_R(0.003),
+    held_step(&plr_process_imu, &filter, filter.belief.t_ns + 1000000, reading, PLR_R(0.001),
+              PLR_R(0.004));
+    held_step(&plr_process_imu, &filter, filter.belief.t_ns + 3000000, reading, PLR_R(0.003),
               PLR_R(0.004));
     for (int i = 0; i < 3; i++) {
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, whole.p_WB[i], filter.p_WB[i]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, (double)whole.inertial.velocity[i],
-                                  (double)filter.inertial.velocity[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, whole.belief.p_WB[i], filter.belief.p_WB[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 10 * eps, (double)whole.belief.velocity[i],
+                                  (double)filter.belief.velocity[i]);
     }
     for (int i = 3; i < 6; i++) { /* the rate's noise, and with it the turn's */
         const double once = (double)whole.motion.Q[7 * i];

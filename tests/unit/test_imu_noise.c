@@ -25,7 +25,7 @@ static void feed(unsigned count, double force, double rate, double swing) {
         const double s = 2 * 3.14159265 * 1.5 * k / 400;
         for (int i = 0; i < 3; i++) {
             imu.a_B_mps2[i] =
-                9.81 * (double)f->R_WB[6 + i] + swing * sin(s) + force * rng_normal(&chance);
+                9.81 * (double)f->belief.R_WB[6 + i] + swing * sin(s) + force * rng_normal(&chance);
             imu.w_B_radps[i] = 0.1 * swing * cos(s) + rate * rng_normal(&chance);
         }
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_inertial(f, begin + UINT64_C(2500000) * k, &imu));
@@ -33,7 +33,7 @@ static void feed(unsigned count, double force, double rate, double swing) {
 }
 
 static double scatter(unsigned which) {
-    return sqrt((double)f->inertial.scatter2[which]);
+    return sqrt((double)f->source.inertial.scatter2[which]);
 }
 
 static void test_scatter_is_the_noise_of_a_reading_and_not_the_motion(void) {

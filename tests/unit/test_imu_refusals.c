@@ -265,7 +265,7 @@ static void test_a_velocity_is_refused_where_there_are_landmarks_or_twists(void)
     static const double v[3] = {1, 2, 3}, good[3] = {0.1, 0.1, 0.1};
     imu_rig_begin(IMU_RIG_GIVEN, 1);
     imu_rig_fly(2);
-    TEST_ASSERT_TRUE(f->count > 0);
+    TEST_ASSERT_TRUE(f->belief.count > 0);
     imu_rig_remember();
     imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good));
     imu_rig.config.process = PLR_PROCESS_TWIST;

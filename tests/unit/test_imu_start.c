@@ -63,7 +63,8 @@ static void test_the_tilts_covariance_is_that_of_the_accelerometers_bias(void) {
     imu_still_begin();
     imu_still_feed_up(IMU_STILL_SECOND + 1, 0, g * sin(roll), g * cos(roll));
     imu_still_demand_started();
-    const double u[3] = {(double)f->R_WB[6], (double)f->R_WB[7], (double)f->R_WB[8]};
+    const double u[3] = {(double)f->belief.R_WB[6], (double)f->belief.R_WB[7],
+                         (double)f->belief.R_WB[8]};
     const double L[9] = {0, -u[2] / g, u[1] / g, u[2] / g, 0, -u[0] / g, -u[1] / g, u[0] / g, 0};
     double *P = specimen_covariance(f);
     for (int i = 0; i < 3; i++)
@@ -267,13 +268,13 @@ static void test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start
     double P[36];
     imu_rig_begin(IMU_RIG_IN_MOTION, 3);
     imu_rig_fly(18);
-    TEST_ASSERT_EQUAL_UINT8(0, f->inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(0, f->source.inertial.anchored);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
     TEST_ASSERT_TRUE(P[0] + P[7] + P[14] > 1e-5);
     imu_rig_fly(6);
-    TEST_ASSERT_EQUAL_UINT8(1, f->inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(1, f->source.inertial.anchored);
     imu_rig_begin(IMU_RIG_IN_MOTION, 3);
-    while (!f->inertial.anchored) {
+    while (!f->source.inertial.anchored) {
         imu_rig_readings(IMU_RIG_EVERY);
         imu_rig_frame();
     }

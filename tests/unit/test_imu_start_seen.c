@@ -125,8 +125,9 @@ static void test_motors_that_idle_are_rest_where_the_pictures_stand(void) {
         TEST_ASSERT_TRUE(P_u[0] < 0.02);
         const double bias2 =
             of_rate[k] * of_rate[k] / IMU_STILL_SECOND; /* known as well as the mean is */
-        TEST_ASSERT_TRUE((double)f->bias_prior_sigma[4] * (double)f->bias_prior_sigma[4] > bias2);
-        TEST_ASSERT_DOUBLE_WITHIN(4 * sqrt(bias2), 0, (double)f->bias[4]);
+        TEST_ASSERT_TRUE(
+            (double)f->source.bias_prior_sigma[4] * (double)f->source.bias_prior_sigma[4] > bias2);
+        TEST_ASSERT_DOUBLE_WITHIN(4 * sqrt(bias2), 0, (double)f->belief.bias[4]);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
         TEST_ASSERT_TRUE(P[21] > of_force[k] * of_force[k] / (IMU_STILL_SECOND * g * g));
     }
@@ -154,7 +155,7 @@ static void test_a_gyro_bias_that_is_far_off_its_prior_is_measured_where_the_pic
     idle(0.02, 0.01, bias, 12, true);
     imu_still_demand_started();
     for (int i = 0; i < 3; i++)
-        TEST_ASSERT_DOUBLE_WITHIN(3e-3, bias[i], (double)f->bias[3 + i]);
+        TEST_ASSERT_DOUBLE_WITHIN(3e-3, bias[i], (double)f->belief.bias[3 + i]);
     idle(0.02, 0.01, bias, 20, true);
     TEST_ASSERT_FALSE(imu_still_reasons() & PLR_REASON_BIAS_OFF_PRIOR);
 }

@@ -90,14 +90,11 @@ static void test_reading_a_landmark_brings_it_up_to_the_pose(void) {
 
 static void test_a_diverged_filter_shows_no_landmark(void) {
     plr_landmark landmark;
-    const plr_landmark known = known_landmark();
     rig_drive(3);
-    rig.filter.diverged = 1;
-    reseal(&rig.filter);
+    spoil_covariance(&rig.filter);
     rig_remember();
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_landmark(&rig.filter, 0, &landmark));
-    rig_demand_untouched(PLR_E_DIVERGED, plr_filter_insert_known(&rig.filter, &known));
-    rig_demand_untouched(PLR_E_DIVERGED, plr_filter_flush_map(&rig.filter));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_flush_map(&rig.filter));
     TEST_ASSERT_EQUAL_UINT(0, handed_over);
 }
 

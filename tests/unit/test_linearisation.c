@@ -34,12 +34,12 @@ void setUp(void) {
 
 /* A landmark straight ahead of an inverse range that may be negative. */
 static void put(double inverse_range, double sigma) {
-    const unsigned slot = filter.count++;
-    const unsigned row = plr_covariance_row(&filter, slot) + 2;
-    memset(&filter.slots[slot], 0, sizeof filter.slots[slot]);
-    filter.slots[slot].x[2] = 500;
-    filter.slots[slot].beyond = (plr_real)(inverse_range - 1.0 / 500);
-    filter.P[plr_packed_at(row, row)] = (plr_real)(sigma * sigma);
+    const unsigned slot = filter.belief.count++;
+    const unsigned row = plr_covariance_row(&filter.belief, slot) + 2;
+    memset(&filter.belief.slots[slot], 0, sizeof filter.belief.slots[slot]);
+    filter.belief.slots[slot].x[2] = 500;
+    filter.belief.slots[slot].beyond = (plr_real)(inverse_range - 1.0 / 500);
+    filter.belief.P[plr_packed_at(row, row)] = (plr_real)(sigma * sigma);
 }
 
 /* A twentieth above it, since twenty points that scatter as much as they are worth settle no more. */
@@ -53,7 +53,7 @@ static void test_well_known_inverse_ranges_have_their_mean(void) {
 static void test_noise_averages_out_and_what_is_well_known_counts_more(void) {
     double worst = 0, mean = 0;
     for (int run = 0; run < RUNS; run++) {
-        filter.count = 0;
+        filter.belief.count = 0;
         for (unsigned i = 0; i < SLOTS; i++) {
             const double sigma = i % 2 ? 0.03 : 0.003;
             put(0.006 + sigma * rng_normal(&chance), sigma);
@@ -74,18 +74,18 @@ static void test_it_is_positive_and_not_below_what_is_certain(void) {
     const double usual = (double)plr_linearisation_usual(&filter);
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.001, usual);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.01, usual);
-    filter.count = 0;
+    filter.belief.count = 0;
     for (unsigned i = 0; i < SLOTS; i++)
         put(-0.01, 1e-6);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1e-5, (double)plr_linearisation_usual(&filter)); /* max-range */
-    filter.count = 0;
+    filter.belief.count = 0;
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1e-5, (double)plr_linearisation_usual(&filter));
 }
 
 static void test_a_landmark_goes_to_the_usual_place_but_not_further_than_two_sigmas(void) {
     const plr_real usual = PLR_R(0.01), change = PLR_R(0.002);
     put(0.03, 0);
-    const plr_slot *slot = &filter.slots[0];
+    const plr_slot *slot = &filter.belief.slots[0];
     const struct {
         double sigma, expected;
     } cases[] = {{0.02, -0.02}, {0.012, -0.02}, {0.005, 0.002 - 0.01}, {0, 0.002}};

@@ -24,22 +24,23 @@ enum { FRAMES = 25, FEW = 7 };
 
 static unsigned calls[SCENE_MAX_LANDMARKS + 100]; /* of this frame, by the landmark's id */
 
-static void count(const plr_filter *f, unsigned slot) {
-    TEST_ASSERT_LESS_THAN_UINT(sizeof calls / sizeof *calls, f->slots[slot].id);
-    calls[f->slots[slot].id]++;
+static void count(const plr_belief *belief, unsigned slot) {
+    TEST_ASSERT_LESS_THAN_UINT(sizeof calls / sizeof *calls, belief->slots[slot].id);
+    calls[belief->slots[slot].id]++;
 }
 
-static void derive_body(const plr_filter *f, unsigned slot, const plr_view *view,
-                        const plr_real Dz[9], const plr_real along[3], plr_real z[3], plr_rows *H) {
-    count(f, slot);
-    real_body.derive(f, slot, view, Dz, along, z, H);
+static void derive_body(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
+                        const plr_view *view, const plr_real Dz[9], const plr_real along[3],
+                        plr_real z[3], plr_rows *H) {
+    count(belief, slot);
+    real_body.derive(belief, camera, slot, view, Dz, along, z, H);
 }
 
-static void derive_world(const plr_filter *f, unsigned slot, const plr_view *view,
-                         const plr_real Dz[9], const plr_real along[3], plr_real z[3],
-                         plr_rows *H) {
-    count(f, slot);
-    real_world.derive(f, slot, view, Dz, along, z, H);
+static void derive_world(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
+                         const plr_view *view, const plr_real Dz[9], const plr_real along[3],
+                         plr_real z[3], plr_rows *H) {
+    count(belief, slot);
+    real_world.derive(belief, camera, slot, view, Dz, along, z, H);
 }
 
 static bool source(void *context, uint32_t id, plr_landmark *landmark) {

@@ -31,14 +31,15 @@ void setUp(void) {
 
 /* A, from (xi, db, w) to (xi, db, dm): dm = J (xi, w). n x n; to be freed. */
 static double *errors_to_world(void) {
-    const unsigned n = plr_covariance_dim(&body);
+    const unsigned n = plr_covariance_dim(&body.belief);
     double *A = specimen_zeros(n, n);
-    for (unsigned i = 0; i < plr_covariance_row(&body, 0); i++)
+    for (unsigned i = 0; i < plr_covariance_row(&body.belief, 0); i++)
         A[i * n + i] = 1;
-    for (unsigned slot = 0; slot < body.count; slot++) {
-        const unsigned row = plr_covariance_row(&body, slot);
+    for (unsigned slot = 0; slot < body.belief.count; slot++) {
+        const unsigned row = plr_covariance_row(&body.belief, slot);
         plr_world_point point;
-        plr_model_body.in_world(&body, &body.slots[slot], &point);
+        plr_model_body.in_world(&body.belief, &body.camera, &body.motion, &body.belief.slots[slot],
+                                &point);
         specimen_put_rows(A + (size_t)row * n, n, &point.J);
     }
     return A;
@@ -49,16 +50,17 @@ static void take_pair(bool bias) {
     specimen_filter(&body, &chance, PLR_MODEL_BODY, bias, LANDMARKS);
     world = body;
     world.config.model = PLR_MODEL_WORLD;
-    world.model = PLR_MODEL_WORLD;
+    world.belief.model = PLR_MODEL_WORLD;
     for (unsigned slot = 0; slot < LANDMARKS; slot++) {
         plr_world_point point;
-        plr_model_body.in_world(&body, &body.slots[slot], &point);
-        to_reals(world.slots[slot].x, point.p_W, 3);
+        plr_model_body.in_world(&body.belief, &body.camera, &body.motion, &body.belief.slots[slot],
+                                &point);
+        to_reals(world.belief.slots[slot].x, point.p_W, 3);
     }
-    const unsigned n = plr_covariance_dim(&body);
+    const unsigned n = plr_covariance_dim(&body.belief);
     double *A = errors_to_world(), *P = specimen_covariance(&body), *AP = specimen_zeros(n, n);
     oracle_sandwich(n, n, A, P, AP);
-    pack_lower(world.P, AP, n);
+    pack_lower(world.belief.P, AP, n);
     free(AP);
     free(P);
     free(A);
@@ -67,7 +69,7 @@ static void take_pair(bool bias) {
 static void test_observations_are_linearly_equivalent_at_one_point(void) {
     for (int run = 0; run < RUNS; run++) {
         take_pair(run % 2);
-        const unsigned n = plr_covariance_dim(&body);
+        const unsigned n = plr_covariance_dim(&body.belief);
         double *A = errors_to_world(), *H_body = specimen_zeros(3, n);
         double *H_world = specimen_zeros(3, n), *HA = specimen_zeros(3, n);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
@@ -113,7 +115,7 @@ static void test_how_the_pose_moves_a_point_agrees_with_differences(void) {
         rng_normals(&chance, 5, s, 3);
         to_reals(s_real, s, 3);
         to_doubles(s, s_real, 3);
-        plr_world_by_pose(body.R_WB, s_real, J);
+        plr_world_by_pose(body.belief.R_WB, s_real, J);
         for (int j = 0; j < 6; j++) {
             const double h = 1e-6;
             double ends[2][3];

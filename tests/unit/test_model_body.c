@@ -30,7 +30,7 @@ static void take_specimen(bool bias, unsigned landmarks) {
 }
 
 static void point_of(unsigned slot, double q[3]) {
-    to_doubles(q, filter.slots[slot].x, 3);
+    to_doubles(q, filter.belief.slots[slot].x, 3);
 }
 
 /* ---------------------------------------------------------------- observation */
@@ -50,9 +50,10 @@ static void test_observation_agrees_with_differences(void) {
             to_doubles(got, predicted, 3);
             TEST_ASSERT_DOUBLE_WITHIN(5000 * eps, 0, largest_difference(z, got, 3));
             plr_view view;
-            TEST_ASSERT_TRUE(plr_model_of(&filter)->look(&filter, slot, &view));
+            TEST_ASSERT_TRUE(
+                plr_model_of(&filter.belief)->look(&filter.belief, &filter.camera, slot, &view));
             TEST_ASSERT_DOUBLE_WITHIN(0, q[2], (double)view.q[2]);
-            specimen_chart(filter.slots[slot].x, Jw, Ji);
+            specimen_chart(filter.belief.slots[slot].x, Jw, Ji);
             for (int j = 0; j < 3; j++) {
                 const double h = j < 2 ? 1e-6 : 1e-6 / q[2];
                 double ahead[3], behind[3], z_ahead[3], z_behind[3];
@@ -77,11 +78,12 @@ static void test_a_point_nearer_than_min_depth_is_not_linearised(void) {
     take_specimen(false, 1);
     plr_view view;
     for (unsigned i = 0; i < sizeof depths_m / sizeof *depths_m; i++) {
-        filter.slots[0].x[2] = (plr_real)depths_m[i];
-        TEST_ASSERT_FALSE(plr_model_of(&filter)->look(&filter, 0, &view));
+        filter.belief.slots[0].x[2] = (plr_real)depths_m[i];
+        TEST_ASSERT_FALSE(
+            plr_model_of(&filter.belief)->look(&filter.belief, &filter.camera, 0, &view));
     }
-    filter.slots[0].x[2] = PLR_R(0.301);
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->look(&filter, 0, &view));
+    filter.belief.slots[0].x[2] = PLR_R(0.301);
+    TEST_ASSERT_TRUE(plr_model_of(&filter.belief)->look(&filter.belief, &filter.camera, 0, &view));
 }
 
 /* ---------------------------------------------------------------- new landmarks */
@@ -97,14 +99,15 @@ static void test_a_new_landmark_takes_its_covariance_through_the_chart(void) {
         rng_normals(&chance, 0.1, s, 9);
         to_reals(S, s, 9);
         to_doubles(s, S, 9);
-        plr_model_of(&filter)->initialise(&filter, filter.slots[slot].x, S, &landmark);
-        specimen_chart(filter.slots[slot].x, Jw, Ji);
+        plr_model_of(&filter.belief)
+            ->initialise(&filter.belief, &filter.camera, filter.belief.slots[slot].x, S, &landmark);
+        specimen_chart(filter.belief.slots[slot].x, Jw, Ji);
         square_multiply(3, Jw, s, JS);
         oracle_sandwich(3, 3, JS, identity, expected);
         to_doubles(got, landmark.P, 9);
         TEST_ASSERT_DOUBLE_WITHIN(50 * eps, 0, specimen_gap(3, expected, got));
         TEST_ASSERT_FALSE(landmark.uses_pose);
-        TEST_ASSERT_TRUE(same_bits(filter.slots[slot].x, landmark.x, 3));
+        TEST_ASSERT_TRUE(same_bits(filter.belief.slots[slot].x, landmark.x, 3));
     }
 }
 
@@ -114,7 +117,7 @@ static void known_landmark(plr_landmark *known) {
     random_spd(&chance, 3, 0.1, P);
     memcpy(known->P_W_m2, P, sizeof P);
     for (int i = 0; i < 3; i++)
-        known->p_W_m[i] = filter.p_WB[i] + 8 * rng_normal(&chance);
+        known->p_W_m[i] = filter.belief.p_WB[i] + 8 * rng_normal(&chance);
 }
 
 /* Where a fixed point of the world stands in the camera if the body is off by xi. */
@@ -134,7 +137,9 @@ static void test_a_known_landmark_hangs_on_the_pose_as_differences_say(void) {
         double q[3], got[3], Jw[9], Ji[9];
         take_specimen(false, 0);
         known_landmark(&known);
-        TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+        TEST_ASSERT_TRUE(
+            plr_model_of(&filter.belief)
+                ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
         seen_from((const double[6]){0}, known.p_W_m, q);
         to_doubles(got, landmark.x, 3);
         TEST_ASSERT_DOUBLE_WITHIN(300 * eps, 0, largest_difference(q, got, 3));
@@ -177,15 +182,25 @@ static void test_a_known_landmark_on_the_camera_or_out_of_range_is_refused(void)
     rigid_inverse(T_BC, truth.T_CB);
     rigid_apply(centre, T_BC, (const double[3]){0});
     rigid_apply(known.p_W_m, truth.T_WB, centre);
-    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] += 0.5;
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] += 99990;
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] += 20; /* max-range is 100 km */
-    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     known.p_W_m[0] = 1e300;
-    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
 }
 
 /* ---------------------------------------------------------------- in the world */
@@ -196,7 +211,9 @@ static void test_place_in_the_world_agrees_with_differences(void) {
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             plr_world_point point;
             double q[3], s[3], m[3], T_BC[16], Jw[9], Ji[9], R_WC[9], J[9];
-            plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &point);
+            plr_model_of(&filter.belief)
+                ->in_world(&filter.belief, &filter.camera, &filter.motion,
+                           &filter.belief.slots[slot], &point);
             point_of(slot, q);
             rigid_inverse(T_BC, truth.T_CB);
             rigid_apply(s, T_BC, q);
@@ -215,7 +232,7 @@ static void test_place_in_the_world_agrees_with_differences(void) {
                     TEST_ASSERT_DOUBLE_WITHIN(1e-7 + 300 * eps, (ends[0][i] - ends[1][i]) / (2 * h),
                                               (double)point.J.term[1].H[6 * i + j]);
             }
-            specimen_chart(filter.slots[slot].x, Jw, Ji);
+            specimen_chart(filter.belief.slots[slot].x, Jw, Ji);
             observe_camera_to_world(&truth, R_WC);
             square_multiply(3, R_WC, Ji, J);
             for (int i = 0; i < 9; i++)

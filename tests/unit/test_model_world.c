@@ -61,7 +61,7 @@ static void test_observation_agrees_with_differences(void) {
             plr_real predicted[3];
             double m[3], z[3], got[3], ends[2][3];
             TEST_ASSERT_EQUAL_UINT(2, lin.H.terms);
-            to_doubles(m, filter.slots[slot].x, 3);
+            to_doubles(m, filter.belief.slots[slot].x, 3);
             seen_from(none, m, z);
             specimen_prediction(&filter, slot, predicted);
             to_doubles(got, predicted, 3);
@@ -98,8 +98,9 @@ static void test_a_point_nearer_than_min_depth_is_not_linearised(void) {
         double m[3] = {0, 0, depths_m[i]};
         rigid_apply(m, T_BC, m);
         rigid_apply(m, truth.T_WB, m);
-        to_reals(filter.slots[0].x, m, 3);
-        TEST_ASSERT_FALSE(plr_model_of(&filter)->look(&filter, 0, &view));
+        to_reals(filter.belief.slots[0].x, m, 3);
+        TEST_ASSERT_FALSE(
+            plr_model_of(&filter.belief)->look(&filter.belief, &filter.camera, 0, &view));
     }
 }
 
@@ -127,7 +128,8 @@ static void test_a_new_landmark_copies_the_pose_through_its_jacobian(void) {
         rng_normals(&chance, 0.3, s, 9);
         to_reals(S, s, 9);
         to_doubles(s, S, 9);
-        plr_model_of(&filter)->initialise(&filter, q_real, S, &landmark);
+        plr_model_of(&filter.belief)
+            ->initialise(&filter.belief, &filter.camera, q_real, S, &landmark);
 
         place_from(none, q, m);
         to_doubles(got, landmark.x, 3);
@@ -156,23 +158,25 @@ static void test_an_independent_landmark_shares_nothing_with_the_pose(void) {
     const plr_real q[3] = {PLR_R(0.5), PLR_R(-0.25), PLR_R(8)};
     const plr_real S[9] = {PLR_R(1.4), 0, 0, 0, PLR_R(1.4), 0, 0, 0, PLR_R(1.4)};
     take_specimen(true, LANDMARKS);
-    filter.config.landmark_prior = PLR_PRIOR_INDEPENDENT;
+    filter.camera.landmark_prior = PLR_PRIOR_INDEPENDENT;
     plr_new_landmark landmark;
-    plr_model_of(&filter)->initialise(&filter, q, S, &landmark);
+    plr_model_of(&filter.belief)->initialise(&filter.belief, &filter.camera, q, S, &landmark);
     TEST_ASSERT_FALSE(landmark.uses_pose);
-    plr_covariance_append(&filter, &landmark);
-    const unsigned row = plr_covariance_dim(&filter);
+    plr_covariance_append(&filter.belief, &landmark);
+    const unsigned row = plr_covariance_dim(&filter.belief);
     for (unsigned i = 0; i < 3; i++)
         for (unsigned j = 0; j <= row + i; j++)
             TEST_ASSERT_DOUBLE_WITHIN(16 * eps, j == row + i ? 1.96 : 0,
-                                      (double)filter.P[plr_packed_at(row + i, j)]);
+                                      (double)filter.belief.P[plr_packed_at(row + i, j)]);
 }
 
 static void test_a_known_landmark_enters_as_it_is(void) {
     plr_landmark known = {.p_W_m = {1, -2, 3}, .P_W_m2 = {4, 1, 0, 1, 5, 2, 0, 2, 6}};
     plr_new_landmark landmark;
     take_specimen(false, 0);
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(
+        plr_model_of(&filter.belief)
+            ->adopt(&filter.belief, &filter.camera, &filter.motion, &known, &landmark));
     TEST_ASSERT_FALSE(landmark.uses_pose);
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(0, known.p_W_m[i], (double)landmark.x[i]);
@@ -183,12 +187,12 @@ static void test_a_known_landmark_enters_as_it_is(void) {
 static void test_motion_moves_no_landmark_and_no_landmark_block(void) {
     take_specimen(true, LANDMARKS);
     plr_slot before[LANDMARKS];
-    memcpy(before, filter.slots, sizeof before);
+    memcpy(before, filter.belief.slots, sizeof before);
     double *P = specimen_covariance(&filter);
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     specimen_motion(&filter, &chance, &filter.motion);
-    plr_predict_apply_prior(&filter);
-    TEST_ASSERT_EQUAL_MEMORY(before, filter.slots, sizeof before);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_predict_apply_prior(&filter));
+    TEST_ASSERT_EQUAL_MEMORY(before, filter.belief.slots, sizeof before);
     double *after = specimen_covariance(&filter);
     for (unsigned i = 12; i < n; i++)
         for (unsigned j = 12; j < n; j++)
@@ -200,17 +204,18 @@ static void test_motion_moves_no_landmark_and_no_landmark_block(void) {
 
 static void test_retraction_adds_to_landmarks_and_leaves_P_alone(void) {
     take_specimen(true, LANDMARKS);
-    const unsigned n = plr_covariance_dim(&filter);
+    const unsigned n = plr_covariance_dim(&filter.belief);
     plr_real dx[12 + 3 * LANDMARKS];
     double same[12 + 3 * LANDMARKS], before[3 * LANDMARKS], after[3];
     rng_normals(&chance, 0.1, same, n);
     to_reals(dx, same, n);
     for (unsigned slot = 0; slot < LANDMARKS; slot++)
-        to_doubles(before + 3 * slot, filter.slots[slot].x, 3);
+        to_doubles(before + 3 * slot, filter.belief.slots[slot].x, 3);
     double *P = specimen_covariance(&filter);
-    TEST_ASSERT_EQUAL_UINT(0, plr_model_of(&filter)->retract(&filter, dx));
+    TEST_ASSERT_EQUAL_UINT(
+        0, plr_model_of(&filter.belief)->retract(&filter.belief, &filter.camera, &filter.work, dx));
     for (unsigned slot = 0; slot < LANDMARKS; slot++) {
-        to_doubles(after, filter.slots[slot].x, 3);
+        to_doubles(after, filter.belief.slots[slot].x, 3);
         for (unsigned i = 0; i < 3; i++)
             TEST_ASSERT_DOUBLE_WITHIN(100 * eps, before[3 * slot + i] + same[12 + 3 * slot + i],
                                       after[i]);
@@ -226,8 +231,10 @@ static void test_place_in_the_world_is_the_landmark_itself(void) {
     for (unsigned slot = 0; slot < LANDMARKS; slot++) {
         plr_world_point point;
         double m[3];
-        plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &point);
-        to_doubles(m, filter.slots[slot].x, 3);
+        plr_model_of(&filter.belief)
+            ->in_world(&filter.belief, &filter.camera, &filter.motion, &filter.belief.slots[slot],
+                       &point);
+        to_doubles(m, filter.belief.slots[slot].x, 3);
         TEST_ASSERT_DOUBLE_WITHIN(0, 0, largest_difference(m, point.p_W, 3));
         TEST_ASSERT_EQUAL_UINT(1, point.J.terms); /* the pose's error has no part in it */
         for (int i = 0; i < 9; i++)

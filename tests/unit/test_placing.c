@@ -50,7 +50,7 @@ static void see(plr_seen_known *known, const double q[3], double map_sigma, doub
     rigid_apply(w, back, q);
     rng_normals(&chance, map_sigma, off, 3);
     rng_normals(&chance, pixel_sigma, noise, 4);
-    plr_stereo_project(z, &f.par.camera, at);
+    plr_stereo_project(z, &f.camera.given, at);
     for (unsigned i = 0; i < 3; i++) {
         known->w[i] = (plr_real)(w[i] + off[i]);
         known->P[4 * i] = (plr_real)(map_sigma * map_sigma);
@@ -103,7 +103,8 @@ static void check_covariance(unsigned count, double map_sigma) {
     plr_placing placing;
     for (unsigned run = 0; run < RUNS; run++) {
         see_anywhere(count, map_sigma, 1);
-        TEST_ASSERT_GREATER_OR_EQUAL_UINT(count - 2, plr_place(&f, seen, count, NULL, &placing));
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT(count - 2,
+                                          plr_place(&f.camera, seen, count, NULL, &placing));
         sum += squared_error(&placing);
     }
     TEST_ASSERT_DOUBLE_WITHIN(4.5 * sqrt(12.0 / RUNS), 6, sum / RUNS);
@@ -123,7 +124,7 @@ static void test_wrong_points_change_nothing(void) {
         for (unsigned i = 0; i < 8; i++) { /* two in five lie elsewhere */
             seen[2 * i].w[run % 3] += PLR_R(3) + (plr_real)rng_uniform(&chance, 0, 1);
         }
-        const unsigned agreeing = plr_place(&f, seen, 20, NULL, &placing);
+        const unsigned agreeing = plr_place(&f.camera, seen, 20, NULL, &placing);
         lost += agreeing < 10;
         if (agreeing >= 10)
             TEST_ASSERT_LESS_THAN_DOUBLE(40, squared_error(&placing));
@@ -136,7 +137,7 @@ static void test_those_that_agree_are_marked(void) {
     see_anywhere(12, 0, 0.1);
     seen[3].w[0] += 5;
     seen[7].gap_d2 = 100;
-    TEST_ASSERT_EQUAL_UINT(10, plr_place(&f, seen, 12, NULL, &placing));
+    TEST_ASSERT_EQUAL_UINT(10, plr_place(&f.camera, seen, 12, NULL, &placing));
     for (unsigned i = 0; i < 12; i++)
         TEST_ASSERT_EQUAL(i != 3 && i != 7, seen[i].agrees);
 }
@@ -152,7 +153,7 @@ static void test_points_of_another_map_agree_on_nothing(void) {
         for (unsigned i = 0; i + 1 < 20; i++)
             memcpy(seen[i].w, seen[i + 1].w, sizeof first);
         memcpy(seen[19].w, first, sizeof first);
-        TEST_ASSERT_LESS_THAN_UINT(8, plr_place(&f, seen, 20, NULL, &placing));
+        TEST_ASSERT_LESS_THAN_UINT(8, plr_place(&f.camera, seen, 20, NULL, &placing));
     }
 }
 
@@ -160,7 +161,7 @@ static void test_too_few_tell_nothing(void) {
     plr_placing placing;
     see_anywhere(20, 0, 0.1);
     for (unsigned count = 0; count < PLR_PLACING_LEAST; count++)
-        TEST_ASSERT_EQUAL_UINT(0, plr_place(&f, seen, count, NULL, &placing));
+        TEST_ASSERT_EQUAL_UINT(0, plr_place(&f.camera, seen, count, NULL, &placing));
 }
 
 /* On a line the turn about it is open. */
@@ -171,7 +172,7 @@ static void test_points_on_a_line_tell_nothing(void) {
         const double q[3] = {-2 + 0.2 * i, 0.5, 5 + 0.1 * i};
         see(&seen[i], q, 0, 0.1);
     }
-    TEST_ASSERT_EQUAL_UINT(0, plr_place(&f, seen, 20, NULL, &placing));
+    TEST_ASSERT_EQUAL_UINT(0, plr_place(&f.camera, seen, 20, NULL, &placing));
 }
 
 /* With disparities of a pixel the depth of three points tells no pose. */
@@ -183,7 +184,7 @@ static void test_distant_points_tell_nothing(void) {
                                      z * rng_uniform(&chance, -0.6, 0.6), z};
         see(&seen[i], q, 0, 1);
     }
-    TEST_ASSERT_EQUAL_UINT(0, plr_place(&f, seen, 20, NULL, &placing));
+    TEST_ASSERT_EQUAL_UINT(0, plr_place(&f.camera, seen, 20, NULL, &placing));
 }
 
 /* What the likeliest pose has least of: squared residuals of the points, and of the prior. In double. */
@@ -228,7 +229,7 @@ static void test_few_points_and_a_prior_give_the_likeliest_pose(void) {
                 prior.R[3 * i + j] = (plr_real)T_prior[4 * i + j];
             prior.t[i] = (plr_real)T_prior[4 * i + 3];
         }
-        if (plr_place_by_prior(&f, seen, count, &prior, &placing) < count) {
+        if (plr_place_by_prior(&f.camera, seen, count, &prior, &placing) < count) {
             disagreeing++;
             continue;
         }

@@ -140,10 +140,10 @@ static void test_the_pose_gains_what_was_allowed_and_nothing_else_changes(void) 
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, more));
     for (unsigned i = 0; i < 36; i++)
         TEST_ASSERT_DOUBLE_WITHIN(1e-5 * (fabs(P[i]) + 0.04), P[i] + P_moved[i], more[i]);
-    TEST_ASSERT_EQUAL_MEMORY(before.R_WB, filter.R_WB, sizeof filter.R_WB);
-    TEST_ASSERT_EQUAL_MEMORY(before.p_WB, filter.p_WB, sizeof filter.p_WB);
-    TEST_ASSERT_EQUAL_MEMORY(before.slots, filter.slots, sizeof filter.slots);
-    TEST_ASSERT_EQUAL_MEMORY(before.P, filter.P, sizeof filter.P);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.R_WB, filter.belief.R_WB, sizeof filter.belief.R_WB);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.p_WB, filter.belief.p_WB, sizeof filter.belief.p_WB);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.slots, filter.belief.slots, sizeof filter.belief.slots);
+    TEST_ASSERT_EQUAL_MEMORY(before.belief.P, filter.belief.P, sizeof filter.belief.P);
     TEST_ASSERT_EQUAL_MEMORY(&before.totals, &filter.totals, sizeof filter.totals);
 }
 
@@ -151,10 +151,10 @@ static void test_the_pose_gains_what_was_allowed_and_nothing_else_changes(void) 
 static void test_a_body_that_stood_before_goes_on_undamaged(void) {
     rng chance = rng_seeded(23);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, 4);
-    filter.slots[2].anchored = 1;
+    filter.belief.slots[2].anchored = 1;
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 77, NULL));
-    TEST_ASSERT_EQUAL_UINT8(0, filter.slots[2].anchored);
+    TEST_ASSERT_EQUAL_UINT8(0, filter.belief.slots[2].anchored);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_save(&filter, NULL, NULL));
 }
 

@@ -35,7 +35,7 @@ static plr_measurement rows_of(const plr_reading *reading) {
     memset(&m, 0, sizeof m);
     for (int i = 0; i < PLR_ROWS; i++)
         m.R[i] = 1;
-    plr_sensor_of(reading->sensor)->of_state(&filter, reading, &m);
+    plr_sensor_of(reading->sensor)->of_state(&filter.belief, reading, &m);
     return m;
 }
 
@@ -55,16 +55,16 @@ static void residual_beside(const plr_reading *reading, int direction, double h,
     double xi[6] = {0}, T[16], E[16], moved[16];
     plr_pose pose;
     for (int i = 0; i < 9; i++)
-        pose.R[i] = (double)filter.R_WB[i];
-    memcpy(pose.p, filter.p_WB, sizeof pose.p);
+        pose.R[i] = (double)filter.belief.R_WB[i];
+    memcpy(pose.p, filter.belief.p_WB, sizeof pose.p);
     xi[direction] = h;
     rigid_from_pose(T, &pose);
     rigid_exp(E, xi);
     square_multiply(4, T, E, moved);
     rigid_to_pose(&pose, moved);
     for (int i = 0; i < 9; i++)
-        filter.R_WB[i] = (plr_real)pose.R[i];
-    memcpy(filter.p_WB, pose.p, sizeof pose.p);
+        filter.belief.R_WB[i] = (plr_real)pose.R[i];
+    memcpy(filter.belief.p_WB, pose.p, sizeof pose.p);
     const plr_measurement m = rows_of(reading);
     memcpy(r, m.r, sizeof m.r);
     filter = before;
@@ -75,7 +75,7 @@ static void compare_with_differences(const plr_reading *reading) {
     const plr_measurement m = rows_of(reading);
     const plr_term *pose = &m.H.term[0];
     TEST_ASSERT_EQUAL_UINT(1, m.H.terms);
-    TEST_ASSERT_EQUAL_UINT(plr_row_of(&filter, PLR_BLOCK_POSE), pose->row);
+    TEST_ASSERT_EQUAL_UINT(plr_row_of(&filter.belief, PLR_BLOCK_POSE), pose->row);
     TEST_ASSERT_EQUAL_UINT(PLR_POSE_DIM, pose->columns);
     for (int c = 0; c < PLR_POSE_DIM; c++) {
         plr_real ahead[PLR_ROWS], behind[PLR_ROWS];

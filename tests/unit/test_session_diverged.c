@@ -25,8 +25,7 @@ static void begin_and_diverge(void) {
     run_frames(0, 5);
     while (faulty_port_answer(&port, &answer))
         continue;
-    session.filter.diverged = 1;
-    reseal(&session.filter);
+    spoil_covariance(&session.filter);
 }
 
 static bool is_unknown(const double packed[21]) {
@@ -111,8 +110,7 @@ static void test_a_human_is_told_once(void) {
 static void test_a_human_is_told_each_time(void) {
     begin_and_diverge();
     run_frames(5, 10);
-    session.filter.diverged = 1;
-    reseal(&session.filter);
+    spoil_covariance(&session.filter);
     run_frames(10, 15);
     TEST_ASSERT_EQUAL_UINT(2, count_texts(PLR_SEVERITY_ERROR, "the filter diverged at"));
 }
@@ -123,8 +121,7 @@ static void test_a_start_makes_the_covariance_known_again(void) {
     run_frames(5, 7);
     while (faulty_port_answer(&port, &answer))
         continue;
-    session.filter.diverged = 1; /* and no frame comes between */
-    reseal(&session.filter);
+    spoil_covariance(&session.filter); /* and no frame comes between */
     desk_send(drive_start(0.6));
     run_frames(7, 9);
     for (int k = 7; k < 9; k++) {

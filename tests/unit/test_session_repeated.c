@@ -47,10 +47,14 @@ static void drive(plr_session *s, faulty_port *p, int times) {
 static void test_it_is_refused_and_changes_no_bit(void) {
     drive(&session, &port, 3);
     drive(&once, &other, 1);
-    TEST_ASSERT_EQUAL_MEMORY(&once.filter.slots, &session.filter.slots, sizeof once.filter.slots);
-    TEST_ASSERT_EQUAL_MEMORY(&once.filter.P, &session.filter.P, sizeof once.filter.P);
-    TEST_ASSERT_EQUAL_MEMORY(&once.filter.p_WB, &session.filter.p_WB, sizeof once.filter.p_WB);
-    TEST_ASSERT_EQUAL_MEMORY(&once.filter.R_WB, &session.filter.R_WB, sizeof once.filter.R_WB);
+    TEST_ASSERT_EQUAL_MEMORY(&once.filter.belief.slots, &session.filter.belief.slots,
+                             sizeof once.filter.belief.slots);
+    TEST_ASSERT_EQUAL_MEMORY(&once.filter.belief.P, &session.filter.belief.P,
+                             sizeof once.filter.belief.P);
+    TEST_ASSERT_EQUAL_MEMORY(&once.filter.belief.p_WB, &session.filter.belief.p_WB,
+                             sizeof once.filter.belief.p_WB);
+    TEST_ASSERT_EQUAL_MEMORY(&once.filter.belief.R_WB, &session.filter.belief.R_WB,
+                             sizeof once.filter.belief.R_WB);
     TEST_ASSERT_EQUAL_UINT32(5, session.filter.totals.frames);
     TEST_ASSERT_EQUAL_UINT32(10, session.totals.refused);
     TEST_ASSERT_EQUAL_INT(PLR_OK, session.last.status);

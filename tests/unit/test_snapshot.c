@@ -125,9 +125,9 @@ static void test_a_contradiction_goes_on_with_the_same_bits(void) {
 static void test_known_landmarks_stay_known(void) {
     config.mode = PLR_MODE_LOCALIZATION;
     save_restore_and_go_on(1);
-    TEST_ASSERT_GREATER_THAN_UINT(0, restored.count);
-    for (unsigned slot = 0; slot < restored.count; slot++)
-        TEST_ASSERT_EQUAL_UINT8(1, restored.slots[slot].known);
+    TEST_ASSERT_GREATER_THAN_UINT(0, restored.belief.count);
+    for (unsigned slot = 0; slot < restored.belief.count; slot++)
+        TEST_ASSERT_EQUAL_UINT8(1, restored.belief.slots[slot].known);
 }
 
 static void test_a_map_in_the_making_goes_on_with_the_same_bits(void) {
@@ -138,7 +138,7 @@ static void test_a_map_in_the_making_goes_on_with_the_same_bits(void) {
 static void test_twists_alone_go_on_with_the_same_bits(void) {
     config.mode = PLR_MODE_DEAD_RECKONING;
     save_restore_and_go_on(3);
-    TEST_ASSERT_EQUAL_UINT(0, restored.count);
+    TEST_ASSERT_EQUAL_UINT(0, restored.belief.count);
 }
 
 static void test_a_filter_that_has_seen_nothing_can_be_saved(void) {
@@ -185,9 +185,9 @@ static void test_every_field_is_carried(void) {
 #define FIELD_OF_plr_state_count(member, is, count, most)
 #define FIELD_OF_plr_state_pose(member, is, count, most)
 #include "filter/snapshot.def"
-    driven.slots[1].beyond = PLR_R(-0.25);
-    driven.slots[1].pixel_hash = 0x3456789A;
-    driven.slots[1].times_gated = 0x12345678;
+    driven.belief.slots[1].beyond = PLR_R(-0.25);
+    driven.belief.slots[1].pixel_hash = 0x3456789A;
+    driven.belief.slots[1].times_gated = 0x12345678;
     reseal(&driven);
     state_bytes_save(&state, &driven);
     start(&restored);
@@ -198,8 +198,8 @@ static void test_every_field_is_carried(void) {
 static void test_negative_zeros_and_subnormals_keep_their_bits(void) {
     start(&driven);
     drive(&driven, NULL, 3);
-    driven.p_WB[0] = -0.0;
-    driven.p_WB[1] = 4.9406564584124654e-324;
+    driven.belief.p_WB[0] = -0.0;
+    driven.belief.p_WB[1] = 4.9406564584124654e-324;
     driven.motion.p[2] = -PLR_SMALLEST_NORMAL / 2;
     reseal(&driven);
     state_bytes_save(&state, &driven);
@@ -259,36 +259,37 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
     start(&driven);
     drive(&driven, NULL, 5);
-    const uint32_t dim = 12 + 3 * driven.count;
+    const uint32_t dim = 12 + 3 * driven.belief.count;
     state_bytes_save(&state, &driven);
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
     TEST_ASSERT_EQUAL_UINT32(15, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
     TEST_ASSERT_EQUAL_UINT(59, state.bytes[12]);
-    TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
-    TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
-    TEST_ASSERT_EQUAL_UINT32(driven.frame_number, number_at(frames_at, 4));
+    TEST_ASSERT_EQUAL_UINT(driven.belief.count, number_at(count_at, 4));
+    TEST_ASSERT_EQUAL_UINT64(driven.belief.t_ns, number_at(count_at + 4, 8));
+    TEST_ASSERT_EQUAL_UINT32(driven.belief.frame_number, number_at(frames_at, 4));
     TEST_ASSERT_EQUAL_UINT8(driven.supervisor.health, number_at(health_at, 1));
     TEST_ASSERT_EQUAL_HEX32(driven.supervisor.reasons, number_at(health_at + 1, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.supervisor.last_frame_ns, number_at(health_at + 5, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.totals.twists, number_at(totals_at, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.totals.created, number_at(totals_at + 68 + 4 * 8, 8));
-    TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
-    TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
-    TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
+    TEST_ASSERT_EQUAL_UINT32(driven.belief.slots[0].id, number_at(id_at, 4));
+    TEST_ASSERT_EQUAL_UINT32(driven.belief.slots[1].id, number_at(id_at + slot, 4));
+    TEST_ASSERT_EQUAL_HEX32(driven.belief.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
     TEST_ASSERT_EQUAL_UINT32(817 + 572 * real, slots_at);
-    TEST_ASSERT_EQUAL_UINT32(
-        slots_at + driven.count * slot + (dim * (dim + 1) / 2 + 5 * dim + 5) * real, state.length);
+    TEST_ASSERT_EQUAL_UINT32(slots_at + driven.belief.count * slot +
+                                 (dim * (dim + 1) / 2 + 5 * dim + 5) * real,
+                             state.length);
 }
 
 static void test_the_size_is_known_beforehand(void) {
     start(&driven);
     for (unsigned i = 0; i < 4; i++) {
         state_bytes_save(&state, &driven);
-        TEST_ASSERT_EQUAL_UINT32(state.length, plr_filter_saved_size(&driven, driven.count));
+        TEST_ASSERT_EQUAL_UINT32(state.length, plr_filter_saved_size(&driven, driven.belief.count));
         drive(&driven, NULL, 1);
     }
-    TEST_ASSERT_EQUAL_UINT(SLOTS, driven.count);
+    TEST_ASSERT_EQUAL_UINT(SLOTS, driven.belief.count);
     TEST_ASSERT_EQUAL_UINT32(0, plr_filter_saved_size(&driven, SLOTS + 1));
     TEST_ASSERT_EQUAL_UINT32(0, plr_filter_saved_size(NULL, 0));
     driven.magic = 0;

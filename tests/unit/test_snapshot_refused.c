@@ -57,18 +57,18 @@ static void test_each_setting_that_differs_makes_it_foreign(void) {
         const double end = here > setting->minimum ? setting->minimum : setting->maximum;
         const double another = setting->kind == PLR_SETTING_COUNT ? here + 1 : end;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_set(&other.config, setting, another));
-        other.model = other.config.model;
+        other.belief.model = other.config.model;
         reseal(&other);
         refuses(PLR_E_FOREIGN);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_set(&other.config, setting, here));
-        other.model = other.config.model;
+        other.belief.model = other.config.model;
         reseal(&other);
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
 }
 
 static void test_each_number_of_another_camera_makes_it_foreign(void) {
-    plr_camera *camera = &other.par.camera;
+    plr_camera *camera = &other.camera.given;
     plr_real *const single[] = {&camera->fx, &camera->fy, &camera->cx, &camera->cy,
                                 &camera->baseline};
     plr_real *numbers[17];
@@ -115,8 +115,8 @@ static void test_more_landmarks_than_slots_are_refused(void) {
 static void test_numbers_that_are_not_finite_are_refused(void) {
     const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
     const uint32_t P_at = place_of_P();
-    const uint32_t places[] = {state_place("time", "interval_s"),
-                               state_place("filter", "core_motion.V"),
+    const uint32_t places[] = {state_place("time", "source.interval_s"),
+                               state_place("filter", "motion.core.V"),
                                state_place("filter", "supervisor.statistic"),
                                state_place("slot", "x"),
                                state_place("slot", "beyond"),
@@ -144,7 +144,7 @@ static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not
 
 static void test_a_flag_is_0_or_1(void) {
     const uint32_t flags[] = {
-        state_place("time", "clock_started"),         state_place("time", "reading_valid"),
+        state_place("time", "clock_started"),         state_place("time", "source.reading_valid"),
         state_place("filter", "supervisor.outright"), state_place("filter", "supervisor.misfits"),
         state_place("filter", "supervisor.frozen"),   state_place("slot", "known"),
         state_place_of_landmark(1, "known")};
@@ -213,7 +213,7 @@ static void test_a_source_that_tells_another_story_the_second_time_resets_the_fi
     const unsigned second = (state.length + PLR_STATE_CHUNK - 1) / PLR_STATE_CHUNK + 1;
     state.flips_at = second; /* the first byte of the magic */
     TEST_ASSERT_EQUAL_INT(PLR_E_FOREIGN, state_bytes_restore(&state, &other));
-    TEST_ASSERT_EQUAL_UINT(0, other.count);
+    TEST_ASSERT_EQUAL_UINT(0, other.belief.count);
     memcpy(&untouched, &filter, sizeof untouched);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&untouched));
     TEST_ASSERT_TRUE(state_bytes_same_filter(&untouched, &other));
@@ -222,29 +222,24 @@ static void test_a_source_that_tells_another_story_the_second_time_resets_the_fi
 /* ---------------------------------------------------------------- filters that cannot */
 
 static void test_a_broken_state_is_not_saved(void) {
-    filter.diverged = 1;
+    filter.belief.P[2] = -1; /* the variance of rho_y */
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_save(&filter, NULL, NULL));
-    filter.diverged = 0;
-    filter.P[2] = -1; /* the variance of rho_y */
-    reseal(&filter);
-    TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_save(&filter, NULL, NULL));
-    filter.P[2] = 1;
-    filter.P[1] = (plr_real)NAN; /* no variance */
+    filter.belief.P[2] = 1;
+    filter.belief.P[1] = (plr_real)NAN; /* no variance */
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, plr_filter_save(&filter, NULL, NULL));
-    filter.P[1] = 0;
+    filter.belief.P[1] = 0;
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_save(&filter, NULL, NULL));
-    filter.bias[2] = (plr_real)INFINITY;
+    filter.belief.bias[2] = (plr_real)INFINITY;
     reseal(&filter);
     state.length = state.calls = 0;
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, plr_filter_save(&filter, state_bytes_take, &state));
 }
 
 static void test_a_diverged_filter_is_sound_again_after_a_restore(void) {
-    other.diverged = 1;
-    other.P[0] = -1;
+    other.belief.P[0] = -1;
     reseal(&other);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
     TEST_ASSERT_TRUE(state_bytes_same_filter(&filter, &other));

@@ -322,12 +322,13 @@ static void test_a_device_that_could_not_hold_a_full_map_is_refused_at_the_first
 static void test_a_broken_filter_is_not_saved_over_a_good_one(void) {
     shelf_saves(0);
     const uint64_t work = flash.work;
-    filter.diverged = 1;
+    const plr_real sound = filter.belief.P[2];
+    filter.belief.P[2] = -1; /* the variance of rho_y */
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, shelf_save(1));
-    filter.diverged = 0;
+    filter.belief.P[2] = sound;
     reseal(&filter);
-    filter.bias[1] = (plr_real)NAN;
+    filter.belief.bias[1] = (plr_real)NAN;
     reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, shelf_save(1));
     filter.magic = 0;

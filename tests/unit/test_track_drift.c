@@ -20,9 +20,9 @@ void setUp(void) {
 }
 
 static void blocks(double P[][9]) {
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         plr_real P_ll[9];
-        plr_covariance_landmark(&rig.filter, slot, P_ll);
+        plr_covariance_landmark(&rig.filter.belief, slot, P_ll);
         for (unsigned i = 0; i < 9; i++)
             P[slot][i] = (double)P_ll[i];
     }
@@ -40,8 +40,8 @@ static void drift_of(unsigned slot, double variance, double C[9]) {
     const double f_px[2] = {rig.calibration.fx_px, rig.calibration.fy_px};
     double q[3], Jw[9], Ji[9];
     for (unsigned i = 0; i < 3; i++)
-        q[i] = (double)rig.filter.slots[slot].x[i];
-    specimen_chart(rig.filter.slots[slot].x, Jw, Ji);
+        q[i] = (double)rig.filter.belief.slots[slot].x[i];
+    specimen_chart(rig.filter.belief.slots[slot].x, Jw, Ji);
     memset(C, 0, 9 * sizeof *C);
     for (unsigned axis = 0; axis < 2; axis++)
         for (unsigned i = 0; i < 3; i++)
@@ -54,8 +54,8 @@ static void drift_of(unsigned slot, double variance, double C[9]) {
 static void demand_growth(double before[][9], double variance) {
     static double after[PLR_MAX_LANDMARKS][9];
     blocks(after);
-    TEST_ASSERT_TRUE(rig.filter.count > 5);
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+    TEST_ASSERT_TRUE(rig.filter.belief.count > 5);
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
         double C[9];
         drift_of(slot, variance, C);
         for (unsigned i = 0; i < 9; i++)
@@ -95,12 +95,12 @@ static void test_the_disparity_does_not_wander(void) {
     unsigned compared = 0;
     rig_drive(10);
     const plr_observation seen = {0};
-    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
-        if (!plr_stereo_measure(&rig.filter, slot, &seen, &m))
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++) {
+        if (!plr_stereo_measure(&rig.filter.belief, &rig.filter.camera, slot, &seen, &m))
             continue;
-        plr_covariance_of_rows(&rig.filter, &m.H, before);
-        plr_model_of(&rig.filter)->drift(&rig.filter, PLR_R(10));
-        plr_covariance_of_rows(&rig.filter, &m.H, after);
+        plr_covariance_of_rows(&rig.filter.belief, &m.H, before);
+        plr_model_of(&rig.filter.belief)->drift(&rig.filter.belief, &rig.filter.camera, PLR_R(10));
+        plr_covariance_of_rows(&rig.filter.belief, &m.H, after);
         const double u = (double)(after[0] - before[0]), v = (double)(after[8] - before[8]);
         const double uLR = (double)(after[1] - before[1]), uR = (double)(after[4] - before[4]);
         TEST_ASSERT_DOUBLE_WITHIN(0.5, 100, u);
@@ -114,10 +114,10 @@ static void test_the_disparity_does_not_wander(void) {
 static void test_landmarks_of_the_map_do_not_wander(void) {
     static double before[PLR_MAX_LANDMARKS][9];
     rig_drive(10);
-    for (unsigned slot = 0; slot < rig.filter.count; slot++)
-        rig.filter.slots[slot].known = 1;
+    for (unsigned slot = 0; slot < rig.filter.belief.count; slot++)
+        rig.filter.belief.slots[slot].known = 1;
     blocks(before);
-    plr_model_of(&rig.filter)->drift(&rig.filter, PLR_R(0.5));
+    plr_model_of(&rig.filter.belief)->drift(&rig.filter.belief, &rig.filter.camera, PLR_R(0.5));
     demand_growth(before, 0);
 }
 

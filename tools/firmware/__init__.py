@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What the firmware costs, measured for docs/SIZES.md: no part of the package."""
+"""Measures the firmware for docs/SIZES.md; it is not part of the package."""

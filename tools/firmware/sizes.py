@@ -30,13 +30,13 @@ from firmware.stack import image_bound
 
 FRAME_OBSERVATIONS = 20
 BUSY_OBSERVATIONS = 60
-# Of the two drives. They fit into the flash of a board, beside the filter, with some KB to spare.
+# Of the two drives, which fit into a board's flash beside the filter, with some KB to spare.
 SECONDS = {FRAME_OBSERVATIONS: "12", BUSY_OBSERVATIONS: "10.5"}
 SEED = "31"
 BENCH_S = 1800.0  # against hangs
 TOLERANCE = 0.03
 PROCESSORS = {"mps2_an386": "m4f", "mps2_an500": "m7", "mps3_an547": "m55", "stm32f405": "m4f"}
-# What QEMU's SysTick really counts, where the part's clock tree is not modelled.
+# QEMU's SysTick rates where the part's clock tree is not modelled.
 EMULATED_HZ = {"stm32f405": 168_000_000}
 INSTRUCTIONS_PER_SECOND = 1_000_000_000  # -icount shift=0: one a nanosecond
 
@@ -47,7 +47,7 @@ class Process:
 
     name: str
     options: tuple[str, ...]  # of `pelorus simulate`
-    step: str  # what the bench image calls a reading of it
+    step: str  # the bench image's name of a reading
     core: int  # rows of the state before the landmarks
 
 
@@ -62,7 +62,8 @@ PROCESSES = {
 
 
 def write_recording(process: Process, target: Path) -> None:
-    """Two drives one after the other: every frame of 20 observations, then the busiest possible.
+    """Writes two drives one after the other: every frame of 20 observations, then the busiest
+    possible.
 
     A file that holds them already is left alone: images are made of it.
     """
@@ -89,7 +90,7 @@ def write_recording(process: Process, target: Path) -> None:
 
 
 def thinned(messages: list[Message], observations: int) -> list[Message]:
-    """Keep so many observations a frame, those of tracks that go on before those that begin."""
+    """Keeps so many observations a frame, with continued tracks before new ones."""
     kept: set[int] = set()
     result: list[Message] = []
     for message in messages:
@@ -110,7 +111,7 @@ def thinned(messages: list[Message], observations: int) -> list[Message]:
 
 @dataclass(frozen=True)
 class Update:
-    """One frame: what was in it, and what it took."""
+    """The content and the cost of one frame."""
 
     instructions: float
     observations: int
@@ -122,19 +123,19 @@ class Update:
 
 @dataclass(frozen=True)
 class Run:
-    """What the drives of one process took."""
+    """The costs of one process's drives."""
 
     steps: list[float] = field(default_factory=list)
     updates: list[Update] = field(default_factory=list)
 
     @property
     def full(self) -> list[float]:
-        """The frames of 20 observations."""
+        """Returns the frames of 20 observations."""
         return [u.instructions for u in self.updates if u.observations == FRAME_OBSERVATIONS]
 
     @property
     def spread(self) -> float:
-        """Worst over median, among frames of which everything counted is the same."""
+        """Returns worst over median among frames with equal counts."""
         groups: dict[tuple[int, ...], list[float]] = {}
         for update in self.updates:
             key = (update.observations, update.matched, update.used, update.created, update.active)
@@ -144,7 +145,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Bench:
-    """What a bench image told."""
+    """The output of a bench image."""
 
     filter_bytes: int
     session_bytes: int
@@ -153,13 +154,13 @@ class Bench:
 
 
 def fields(line: str) -> dict[str, int]:
-    """`name number name number ...`."""
+    """Parses `name number name number ...`."""
     words = line.split()
     return {name: int(number) for name, number in zip(words[::2], words[1::2], strict=True)}
 
 
 def run_bench(board: str, image: Path) -> Bench:
-    """Run the image with one instruction a nanosecond, and read its lines."""
+    """Runs the image with one instruction a nanosecond, and reads its lines."""
     with Emulator(board, image, ("-icount", "shift=0")) as emulator:
         link = emulator.connect()
         text = b""
@@ -206,7 +207,7 @@ class Cost:
 
 
 def section_sizes(image: Path) -> tuple[int, int]:
-    """Flash and RAM of an image, in bytes; RAM with its stack."""
+    """Returns flash and RAM of an image, in bytes; RAM with its stack."""
     table = subprocess.run(
         ["arm-none-eabi-size", str(image)], capture_output=True, text=True, check=True
     ).stdout
@@ -215,14 +216,14 @@ def section_sizes(image: Path) -> tuple[int, int]:
 
 
 def objects_of(firmware: Path, board: str, capacity: int, bits: int = 32) -> list[Path]:
-    """The folders of the objects that an image is linked of."""
+    """Returns the folders of an image's object files."""
     library = f"pelorus-{PROCESSORS[board]}-n{capacity}-f{bits}"
     folder = firmware.parents[1] / "CMakeFiles"
     return [folder / f"{name}.dir" for name in (library, f"port-{board}", firmware.stem)]
 
 
 def measure(build: Path, board: str, capacity: int) -> Cost:
-    """Everything about one board and capacity."""
+    """Measures one board and capacity."""
     firmware = build / "images" / f"pelorus-{board}-n{capacity}.elf"
     flash, ram = section_sizes(firmware)
     benches = {
@@ -251,14 +252,14 @@ TERMS = ("1", "m", "m n", "n^2", "b n", "b n^2")
 
 
 def terms(process: Process, capacity: int, observations: int) -> list[float]:
-    """n is the state's dimension, b the number of blocks."""
+    """Returns the terms of the bound; n is the state's dimension, b the number of blocks."""
     n = process.core + 3 * capacity
     blocks = -(-min(observations, capacity) // 8)
     return [1.0, observations, observations * n, n * n, blocks * n, blocks * n * n]
 
 
 def fit_bound(process: Process, costs: list[Cost]) -> list[float]:
-    """Coefficients as large as the worst frame of any board asks for, and little larger."""
+    """Returns coefficients just large enough for the worst frame of any board."""
     worst: dict[tuple[int, int], float] = {}
     for cost in costs:
         for update in cost.runs[process.name].updates:
@@ -273,7 +274,7 @@ def fit_bound(process: Process, costs: list[Cost]) -> list[float]:
 
 # --- the document --------------------------------------------------------------------------------
 
-BOUND = "its bound"  # fitted to all capacities: with fewer of them it is another
+BOUND = "its bound"  # fitted to all capacities, so fewer of them give another one
 MEMORY_TITLE = "board | N | flash | RAM | filter | session | stack, bound | stack, seen"
 TIME_TITLE = (
     "board | N | {step}, median | worst | frame of 20, median | worst | worst / median at the "
@@ -282,7 +283,7 @@ TIME_TITLE = (
 
 
 def document(costs: list[Cost]) -> str:
-    """docs/SIZES.md."""
+    """Returns the text of docs/SIZES.md."""
     memory = [
         f"| {cost.board} | {cost.capacity} | {cost.flash} | {cost.ram} | {cost.filter} | "
         f"{cost.session} | {cost.stack_bound} | {cost.stack_seen} |"
@@ -303,7 +304,7 @@ def document(costs: list[Cost]) -> str:
 
 
 def time_of(process: Process, costs: list[Cost]) -> tuple[str, str]:
-    """The table of a process, and the bound of its frames."""
+    """Returns the table of a process, and the bound of its frames."""
     bound = fit_bound(process, costs)
     lines = [_title(TIME_TITLE.format(step=process.step))]
     for cost in costs:
@@ -328,8 +329,8 @@ def _title(names: str) -> str:
     return f"| {names} |\n|---|{'---:|' * (count - 1)}"
 
 
-# The search for a frame's motion takes one to six evaluations: frames of the same counts may be so
-# far apart.
+# The search for a frame's motion takes one to six evaluations, so frames of the same counts may
+# differ.
 SPREAD_LIMIT = 1.1
 
 TEMPLATE = """# What it costs
@@ -405,7 +406,7 @@ Numbers = dict[tuple[str, str], dict[str, float]]
 
 
 def numbers(text: str) -> Numbers:
-    """(board and capacity, which table) -> the numbers of a row by the titles of their columns."""
+    """Returns the numbers of a row by column title, for each (board and capacity, table)."""
     rows: Numbers = {}
     titles: list[str] = []
     for line in text.splitlines():
@@ -420,7 +421,7 @@ def numbers(text: str) -> Numbers:
 
 
 def differences(old: str, new: str, capacities: list[int]) -> list[str]:
-    """What moved by more than the tolerance, or is no longer there, at these capacities."""
+    """Returns what differs by more than the tolerance, or is missing, at these capacities."""
     all_of_them, now = numbers(old), numbers(new)
     ends = tuple(f"={n}" for n in capacities)  # of "board N=32"
     before = {key: row for key, row in all_of_them.items() if key[0].endswith(ends)}
@@ -446,7 +447,7 @@ def differences(old: str, new: str, capacities: list[int]) -> list[str]:
 
 
 def measure_all(build: Path, capacities: list[int]) -> list[Cost]:
-    """Every firmware image of these capacities that has its bench beside it."""
+    """Measures every firmware image of these capacities with a bench image."""
     found = []
     for path in (build / "images").glob(f"bench-{PROCESSES[0].name}-*-n*.elf"):
         _, _, board, capacity = path.stem.split("-")
@@ -458,7 +459,7 @@ def measure_all(build: Path, capacities: list[int]) -> list[Cost]:
 
 
 def main(arguments: list[str]) -> int:
-    """See the module's text."""
+    """Runs the command that the module's text describes."""
     match arguments:
         case ["recordings", folder]:
             for process in PROCESSES.values():

@@ -18,8 +18,8 @@ from pathlib import Path
 
 from pelorus.errors import PelorusError
 
-# Who calls through a pointer, and what it may reach: patterns of function names. Of the session's
-# observers the firmware sets one, the telemetry's, and that not in every image.
+# Which functions call through a pointer, and what they may reach: patterns of function names. Of
+# the session's observers the firmware sets one, the telemetry's, and that not in every image.
 MODEL = (r"body_\w+", r"world_\w+")
 PROCESS = (
     r"(twist|imu)\.c:(lay_out|check|step|mean|hold|missed|rest|walk|bias_walk|now|bias_covariance"
@@ -97,25 +97,25 @@ class Function:
 
 @dataclass(frozen=True)
 class Bound:
-    """A depth, and the calls that make it."""
+    """A depth, and the calls that lead to it."""
 
     stack_bytes: int
     path: tuple[str, ...]
 
 
 def short(title: str) -> str:
-    """A static function's title is file:name."""
+    """Returns the name; a static function's title is file:name."""
     return title.rpartition(":")[2]
 
 
 def _where(title: str) -> str:
-    """Of a static function: file.c:name, without what gcc appends to its clones."""
+    """Returns file.c:name of a static function, without gcc's suffixes of its clones."""
     file, _, name = title.rpartition(":")
     return f"{Path(file).name}:{name.partition('.')[0]}"
 
 
 def read_call_graphs(folders: Iterable[Path]) -> dict[str, Function]:
-    """Every function of the .ci files below the folders."""
+    """Reads every function of the .ci files below the folders."""
     functions: dict[str, Function] = {}
     for path in sorted(file for folder in folders for file in folder.rglob("*.ci")):
         text = path.read_text()
@@ -145,7 +145,7 @@ def _register_count(names: str) -> int:
 
 
 def add_machine_code(functions: dict[str, Function], image: Path) -> None:
-    """Add the functions of the image that the compiler told nothing of: libc and libgcc."""
+    """Adds the image's functions that the compiler did not describe: libc and libgcc."""
     listing = subprocess.run(
         ["arm-none-eabi-objdump", "-d", "--no-show-raw-insn", str(image)],
         capture_output=True,
@@ -169,7 +169,7 @@ def add_machine_code(functions: dict[str, Function], image: Path) -> None:
 
 
 def add_aliases(functions: dict[str, Function], image: Path) -> None:
-    """Give every name of an address what is known by one of them."""
+    """Gives every name of an address what is known of one of them."""
     symbols = subprocess.run(
         ["arm-none-eabi-nm", str(image)], capture_output=True, text=True, check=True
     ).stdout
@@ -188,7 +188,7 @@ def add_aliases(functions: dict[str, Function], image: Path) -> None:
 
 
 class Analysis:
-    """Depths over a call graph, without recursion."""
+    """Computes depths over a call graph without recursion."""
 
     def __init__(self, functions: dict[str, Function]) -> None:
         self._functions = functions
@@ -198,7 +198,7 @@ class Analysis:
         self._known: dict[str, Bound] = {}
 
     def bound(self, name: str, above: tuple[str, ...] = ()) -> Bound:
-        """The deepest stack below a call of this function, itself included."""
+        """Returns the deepest stack below a call of this function, itself included."""
         if name in above:
             raise PelorusError(f"recursion: {' -> '.join((*map(short, above), short(name)))}")
         if name not in self._known:
@@ -247,7 +247,7 @@ class Analysis:
 
 
 def image_bound(image: Path, folders: Iterable[Path]) -> Bound:
-    """The most that main can need, with one interrupt on top (they do not nest)."""
+    """Returns the most stack that main can need, with one interrupt on top (they do not nest)."""
     functions = read_call_graphs(folders)
     add_machine_code(functions, image)
     add_aliases(functions, image)

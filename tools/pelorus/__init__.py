@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """Of `__all__` at its first use: the commands need no filter, and most of them no numpy."""
+    """Imports a name of `__all__` at its first use: most commands need no filter, nor numpy."""
     if name not in __all__:
         raise AttributeError(f"module 'pelorus' has no attribute {name!r}")
     if name == "Tracker":

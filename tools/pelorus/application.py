@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The commands' application: what `pelorus` itself says, and the commands that are wanted."""
+"""The commands' application: the options of `pelorus` itself, and the commands that are needed."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pelorus import __version__
 from pelorus.console import out
 from pelorus.outputs import guard_outputs
 
-MODULES = {"try": "first_try"}  # whose file cannot be called as the command is
+MODULES = {"try": "first_try"}  # commands whose file has another name
 
 
 def application(commands: Iterable[str]) -> typer.Typer:
-    """With these commands, which are imported here."""
+    """Returns the application with these commands, which are imported here."""
     app = typer.Typer(
         name="pelorus",
         help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is given to the filter from Python, checked before the library sees it."""
+"""Checks what Python gives to the filter, before the library gets it."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pelorus.errors import PelorusError
 
 
 def kind_of(array: NDArray[Any]) -> str:
-    """Type and shape, in words."""
+    """Returns type and shape in words."""
     return f"{array.dtype} of shape {array.shape}"
 
 
 def checked(name: str, value: ArrayLike, shape: tuple[int, ...], type: Any = np.float64) -> Any:
-    """The value as an array of this shape, without a copy where it is one."""
+    """Returns the value as an array of this shape, without a copy where it is one."""
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different length
@@ -31,14 +31,14 @@ def checked(name: str, value: ArrayLike, shape: tuple[int, ...], type: Any = np.
 
 
 def are_whole(array: NDArray[Any]) -> bool:
-    """Whether all of them are whole numbers, as integers or as floats."""
+    """Returns whether all are whole numbers, as integers or as floats."""
     if array.dtype.kind == "f":
         return bool(np.all(np.isfinite(array)) and np.all(array == np.floor(array)))
     return array.dtype.kind in "iu"
 
 
 def real(name: str, value: Any) -> float:
-    """One number."""
+    """Returns the value as a float; raises PelorusError unless it is one number."""
     try:
         return float(value)
     except (TypeError, ValueError):
@@ -46,7 +46,7 @@ def real(name: str, value: Any) -> float:
 
 
 def whole_number(name: str, value: int, most: int) -> int:
-    """From 0 to `most`."""
+    """Returns the value, a whole number from 0 to `most`; raises PelorusError otherwise."""
     number = value if type(value) is int else integer(name, value)
     if not 0 <= number <= most:
         raise PelorusError(f"{name}: {number}; 0 to {most} are possible")
@@ -54,12 +54,12 @@ def whole_number(name: str, value: int, most: int) -> int:
 
 
 def integer(name: str, value: Any) -> int:
-    """A whole number of Python or numpy."""
+    """Returns the value as an int; it must be a whole number of Python or numpy."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise PelorusError(f"{name}: {value!r} is no whole number")
     return int(value)
 
 
 def address(array: NDArray[Any] | None) -> int | None:
-    """Of its first number; NULL for none."""
+    """Returns the address of its first number; NULL for None."""
     return None if array is None else array.ctypes.data

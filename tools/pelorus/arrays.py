@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Arrays out of .npz and .mat files, with errors that say what is there and what is expected."""
+"""Reads arrays from .npz and .mat files, with errors that say what is expected."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from pelorus.frames import Camera
 from pelorus.layout import Floats
 
 ORTHOGONAL_TOLERANCE = 1e-3
-BASELINES_M = (1e-3, 5.0)  # what a body can carry
+BASELINES_M = (1e-3, 5.0)  # possible baselines on a body
 SECONDS_MAX = 9e9  # below 2^63 ns
 STAMP_MAX_S = 1e11  # the year 5138; today's times in ns are larger by far
-STEP_MAX_S = 1e4  # rows hours apart are none of a drive; in ns it would be 100 kHz
+STEP_MAX_S = 1e4  # a larger step is not in s; as ns it would be 100 kHz
 
 
 def are_ns(stamps: Floats) -> bool:
-    """Whether times are ns rather than s: by their size, else by their steps."""
+    """Returns whether times are ns rather than s: by their size, else by their steps."""
     step = float(np.median(np.abs(np.diff(stamps)))) if len(stamps) > 1 else 0.0
     return step > STEP_MAX_S or bool((np.abs(stamps) > STAMP_MAX_S).any())
 
 
 def never_set(t_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which times are 0 because nobody set them: the others are of another day."""
+    """Returns which times are 0 because nobody set them, while the others are of another day."""
     zero = np.asarray(t_ns == 0, np.bool_)
     others = t_ns[~zero]
     is_clock = not len(others) or int(np.abs(others).min()) <= STEP_MAX_S * 1e9
@@ -48,26 +48,26 @@ class Arrays:
         return key in self._arrays
 
     def one_of(self, *keys: str) -> str:
-        """The first of the keys that the file has."""
+        """Returns the first of the keys that the file has."""
         for key in keys:
             if key in self._arrays:
                 return key
         there = ", ".join(sorted(self._arrays)) or "none"
         raise ForeignFileError(
-            self.path, f"lacks the array {' or '.join(keys)}", due=f"there are: {there}"
+            self.path, f"lacks the array {' or '.join(keys)}", expected=f"there are: {there}"
         )
 
     def get(self, *keys: str, shape: tuple[int | None, ...] | None = None) -> Floats:
-        """The array of the first of the keys; `None` in the shape stands for any size."""
+        """Returns the array of the first existing key; `None` in the shape allows any size."""
         key = self.one_of(*keys)
         try:
             array = np.asarray(self._arrays[key], dtype=np.float64)
         except (TypeError, ValueError):
             raise ForeignFileError(self.path, f"{key} holds no numbers") from None
         if shape is not None and not _fits(array.shape, shape):
-            due = " x ".join("n" if size is None else str(size) for size in shape)
+            expected = " x ".join("n" if size is None else str(size) for size in shape)
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", due=f"{due} is expected"
+                self.path, f"{key} has the shape {array.shape}", expected=f"{expected} is expected"
             )
         if not np.isfinite(array).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -75,13 +75,13 @@ class Arrays:
         return array
 
     def words(self, key: str) -> str:
-        """A text that was saved as an array."""
+        """Returns a text that was saved as an array."""
         array = self._arrays[self.one_of(key)]
         if array.size != 1 or array.dtype.kind not in "US":
             raise ForeignFileError(
                 self.path,
                 f"{key} is {array.size} of type {array.dtype}",
-                due="one text is expected",
+                expected="one text is expected",
             )
         item = array.reshape(()).item()
         return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
@@ -90,29 +90,29 @@ class Arrays:
         array = self.get(key)
         if array.size != 1:
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", due="one number is expected"
+                self.path, f"{key} has the shape {array.shape}", expected="one number is expected"
             )
         return float(array.reshape(()))
 
 
-def _fits(shape: tuple[int, ...], due: tuple[int | None, ...]) -> bool:
-    return len(shape) == len(due) and all(
-        d is None or s == d for s, d in zip(shape, due, strict=True)
+def _fits(shape: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(expected) and all(
+        d is None or s == d for s, d in zip(shape, expected, strict=True)
     )
 
 
 def read_npz(path: Path) -> Arrays:
-    """All arrays of a .npz file."""
+    """Reads all arrays of a .npz file."""
     return Arrays(path, foreign.npz(path))
 
 
 def read_mat(path: Path) -> Arrays:
-    """All variables of a MATLAB file up to version 7."""
+    """Reads all variables of a MATLAB file up to version 7."""
     return Arrays(path, foreign.mat(path))
 
 
 def camera_of(path: Path, fx: float, fy: float, cx: float, cy: float, baseline: float) -> Camera:
-    """The camera, if its numbers can be one's."""
+    """Returns the camera; raises an error if its numbers are impossible."""
     if min(fx, fy, baseline) <= 0:
         raise ForeignFileError(
             path, f"focal lengths {fx}, {fy} px and baseline {baseline} m must be positive"
@@ -122,19 +122,19 @@ def camera_of(path: Path, fx: float, fy: float, cx: float, cy: float, baseline: 
 
 
 def require_baseline(path: Path, length_m: float) -> None:
-    """One that a body can carry."""
+    """Refuses a baseline that no body can carry."""
     if not BASELINES_M[0] <= length_m <= BASELINES_M[1]:
         raise ForeignFileError(
             path,
             f"the cameras stand {length_m:g} apart",
-            due=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are expected: are these "
+            expected=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are expected: are these "
             "millimetres, or "
             "squares of the board? Divide so that it is in metres",
         )
 
 
 def nanoseconds(path: Path, what: str, seconds: Floats) -> NDArray[np.int64]:
-    """Seconds -> ns, checked to ascend."""
+    """Returns s as ns, checked to ascend."""
     if len(seconds) == 0:
         raise ForeignFileError(path, f"{what} is empty")
     check_seconds(path, what, seconds)
@@ -153,7 +153,7 @@ FINER = {"ms": 1e6, "us": 1e3, "ns": 1.0}  # units of time, in ns
 
 
 def check_seconds(path: Path, what: str, numbers: Floats, unit_ns: float = 1e9) -> None:
-    """Refuse times that are none of this unit: negative ones, or nanoseconds by mistake."""
+    """Refuses times that are not in this unit: negative ones, or nanoseconds by mistake."""
     most = SECONDS_MAX * 1e9 / unit_ns
     if numbers.min() < 0 or numbers.max() > most:
         name = {1e9: "seconds", 1e6: "milliseconds", 1e3: "microseconds"}[unit_ns]
@@ -164,12 +164,12 @@ def check_seconds(path: Path, what: str, numbers: Floats, unit_ns: float = 1e9) 
         raise ForeignFileError(
             path,
             f"{what} spans {numbers.min():g} to {numbers.max():g}",
-            due=f"{name} from 0 to {most:g} are expected{guess if numbers.min() >= 0 else ''}",
+            expected=f"{name} from 0 to {most:g} are expected{guess if numbers.min() >= 0 else ''}",
         )
 
 
 def rotation(path: Path, name: str, R: Floats) -> Floats:
-    """R itself if it is a rotation."""
+    """Returns R if it is a rotation; raises an error otherwise."""
     error = float(np.abs(R @ R.T - np.eye(3)).max())
     if error > ORTHOGONAL_TOLERANCE or np.linalg.det(R) < 0:
         raise ForeignFileError(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The order in which steps (twists, readings of an IMU) and frames stand in a recording.
+"""The order of steps (twists, readings of an IMU) and frames in a recording.
 
-A filter goes on in time alone: a frame behind a newer step, or a step behind a newer frame, is
+A filter cannot go back in time: a frame after a newer step, or a step after a newer frame, is
 refused, unless the session lets them wait for each other (setting twist-delay).
 """
 
@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 from pelorus.frames import Imu, Kind, Message, Stereo, Twist
 
-WAIT_MAX_NS = 10_000_000_000  # what twist-delay can be
+WAIT_MAX_NS = 10_000_000_000  # largest twist-delay
 
 
 @dataclass
 class Late:
-    """Those of a kind that stand behind newer ones of the other, and how long these would wait."""
+    """Messages of a kind that come after newer ones of the other, and how long these would wait."""
 
     kind: Kind
     of: int = 0
@@ -27,12 +27,12 @@ class Late:
 
     @property
     def wait_s(self) -> float:
-        """Upwards to a millisecond: what twist-delay should be at least."""
+        """Returns the least twist-delay that helps, rounded up to a millisecond."""
         return math.ceil(self.wait_ns / 1e6) / 1e3
 
     @property
     def words(self) -> str:
-        """What `info` says of it."""
+        """Returns the line of `info`."""
         other = "TWIST or IMU" if self.kind is Kind.STEREO else "STEREO"
         what = "readings" if self.kind is Kind.IMU else "messages"
         said = f"{self.kind.name}: {self.late} of {self.of} {what} stand behind a newer {other}, "
@@ -45,14 +45,14 @@ class Late:
 
 
 def late_ones(messages: Sequence[Message]) -> list[Late]:
-    """Steps behind newer frames, and frames behind newer steps; those that there are.
+    """Returns steps after newer frames, and frames after newer steps, if there are any.
 
-    What does not ascend among its own kind is another matter, and counts as neither.
+    Messages out of order among their own kind are another fault, and not counted.
     """
     steps: dict[Kind, Late] = {}
     frames = Late(Kind.STEREO)
     step_ns = frame_ns = -1  # the newest so far
-    ahead_ns = 0  # how far that frame was ahead of the steps that had come
+    ahead_ns = 0  # how far that frame was ahead of the steps before it
     for message in messages:
         if isinstance(message, Stereo):
             frames.of += 1

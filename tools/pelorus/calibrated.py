@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The CALIBRATION of docs/REPLAY-FORMAT.md: what the filter has estimated of it on the way."""
+"""The CALIBRATION of docs/REPLAY-FORMAT.md: the filter's online estimate of the calibration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pelorus.frames import Camera, Kind, Message, identity, zeros
 from pelorus.layout import Floats
 
 
-class Part(NamedTuple):
+class CalibrationPart(NamedTuple):
     """One number of the calibration, in the order of the message."""
 
     key: str
@@ -24,15 +24,18 @@ class Part(NamedTuple):
 
 
 PARTS = (
-    Part("baseline", "baseline", "%", 100),
-    Part("focal", "focal length", "%", 100),
+    CalibrationPart("baseline", "baseline", "%", 100),
+    CalibrationPart("focal", "focal length", "%", 100),
     *(
-        Part(f"turn_{axis}", f"turn of the camera about its {axis}", "deg", 180 / np.pi)
+        CalibrationPart(f"turn_{axis}", f"turn of the camera about its {axis}", "deg", 180 / np.pi)
         for axis in "xyz"
     ),
-    *(Part(f"centre_{axis}", f"principal point {axis}", "px", 1) for axis in "uv"),
-    *(Part(f"place_{axis}", f"place of the camera along its {axis}", "mm", 1000) for axis in "xyz"),
-    Part("clock", "camera's clock", "ms", 1000),
+    *(CalibrationPart(f"centre_{axis}", f"principal point {axis}", "px", 1) for axis in "uv"),
+    *(
+        CalibrationPart(f"place_{axis}", f"place of the camera along its {axis}", "mm", 1000)
+        for axis in "xyz"
+    ),
+    CalibrationPart("clock", "camera's clock", "ms", 1000),
 )
 MEANING = {
     f"calibrated_{part.key}{end}": f"{what} of the {part.name}, {part.unit}"
@@ -43,9 +46,7 @@ MEANING = {
 
 @dataclass(frozen=True, eq=False)
 class Calibrated(Message, kind=Kind.CALIBRATION):
-    """The calibration as the filter estimates it; `corrected` and `sigma` (11,) in the order of
-    PARTS.
-    """
+    """The filter's calibration; `corrected` and `sigma` (11,) are in the order of PARTS."""
 
     t_ns: int
     estimated: int  # bits
@@ -63,15 +64,15 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
         camera = Camera(**{part.name: values.pop(part.name) for part in fields(Camera)})
         return cls(camera=camera, **values)
 
-    def parts(self) -> Iterator[tuple[Part, float, float]]:
-        """Of what is estimated: by how much it has been corrected, and what may be left."""
+    def parts(self) -> Iterator[tuple[CalibrationPart, float, float]]:
+        """Yields each estimated part with its correction and sigma, in the part's unit."""
         for k, part in enumerate(PARTS):
             if self.estimated >> k & 1:
                 yield part, self.corrected[k] * part.scale, self.sigma[k] * part.scale
 
     @property
     def figures(self) -> Figures:
-        """By the keys of MEANING."""
+        """Returns the figures by the keys of MEANING."""
         return {
             f"calibrated_{part.key}{end}": float(x)
             for part, value, sigma in self.parts()
@@ -80,12 +81,12 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
 
     @property
     def offset_s(self) -> float:
-        """What the setting camera-offset should be larger by."""
+        """Returns the amount to add to the setting camera-offset, s."""
         return float(self.corrected[-1]) if self.estimated >> len(PARTS) - 1 & 1 else 0.0
 
 
 def last_calibrated(messages: Iterable[Message]) -> Calibrated | None:
-    """What a log says last of it; None if nothing was estimated."""
+    """Returns a log's last estimate; None if nothing was estimated."""
     found = None
     for message in messages:
         if isinstance(message, Calibrated):

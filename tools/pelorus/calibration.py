@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A calibration as JSON: what a HEADER needs, by name."""
+"""Reads a calibration from JSON: the named values of a HEADER."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ IMAGE_SIZE_MAX = 65535
 
 
 def read(path: Path) -> Header:
-    """The HEADER that the file describes; unknown names are refused, they may be typing errors."""
+    """Returns the HEADER that the file describes; refuses unknown names, perhaps typing errors."""
     return _Calibration(path, foreign.json_object(path)).header()
 
 
 def read_extrinsic(path: Path) -> Poses:
-    """T_CB of a file that holds nothing else, or of a whole calibration."""
+    """Returns T_CB from a file that has nothing else, or from a whole calibration."""
     return _Calibration(path, foreign.json_object(path)).extrinsic()
 
 
@@ -67,7 +67,7 @@ class _Calibration(Named):
             raise ForeignFileError(
                 self.path,
                 f"has {' and '.join(f'R_{pair}' for pair in given) or 'neither R_CB nor R_BC'}",
-                due="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
+                expected="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
                 "(the camera's pose in the body) are expected",
             )
         pair = given[0]
@@ -105,5 +105,5 @@ class _Calibration(Named):
             raise ForeignFileError(
                 self.path,
                 f"{where} has the unknown name {', '.join(unknown)}",
-                due=f"known are: {', '.join(sorted(known))}",
+                expected=f"known are: {', '.join(sorted(known))}",
             )

@@ -33,14 +33,14 @@ COMMANDS = (
     "compare",
 )
 
-INTERRUPTED = 130  # as a shell tells the signal of Ctrl-C
+INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; 0, or 1 after an error that was told, or 2 if the call makes no sense."""
+    """Runs one command; returns 0, 1 after an error that was reported, or 2 for a wrong call."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     _say_what_cannot_be_encoded()
-    # Before numpy is there: on matrices as small as these threads take more than they give, and
+    # Before numpy is imported: on matrices as small as these threads cost more than they gain, and
     # wait for each other at full speed.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     signal.signal(signal.SIGTERM, _leave)
@@ -51,12 +51,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _leave(number: int, _frame: object) -> None:
-    """As at an error: what is not whole, and temporary files, are removed."""
+    """Ends as after an error: incomplete and temporary files are removed."""
     sys.exit(128 + number)
 
 
 def _say_what_cannot_be_encoded() -> None:
-    r"""An umlaut in a name is no reason to fail where the output is ASCII: it becomes \xfc."""
+    r"""Escapes unencodable letters: an umlaut in a name is no error, it becomes \xfc."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")

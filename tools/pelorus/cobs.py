@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Consistent Overhead Byte Stuffing (Cheshire and Baker, 1999): no zero inside a frame."""
 
-BLOCK_MAX = 254  # data bytes behind a code byte; the code 0xFF stands for a full block
+BLOCK_MAX = 254  # data bytes after a code byte; the code 0xFF stands for a full block
 
 
 _CODE = [bytes((length,)) for length in range(256)]
 
 
 def encode(body: bytes) -> bytes:
-    """Stuff `body`; the result holds no zero byte. The delimiter is not appended.
+    """Stuffs `body`; the result has no zero byte. The delimiter is not appended.
 
-    A full block at the very end gets no empty block behind it; `decode` takes both forms.
+    A full block at the very end gets no empty block after it; `decode` accepts both forms.
     """
     out: list[bytes] = []
     runs = body.split(b"\0")
@@ -28,7 +28,7 @@ def encode(body: bytes) -> bytes:
 
 
 def decode(stuffed: bytes) -> bytes | None:
-    """Undo `encode`; None if `stuffed` is not valid COBS (a zero, or a block past the end)."""
+    """Undoes `encode`; None if `stuffed` is not valid COBS (a zero, or a block past the end)."""
     if not stuffed or 0 in stuffed:
         return None
     out = bytearray(stuffed)  # each block's code becomes the zero before the block

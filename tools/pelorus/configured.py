@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The settings of a `pelorus.Filter`: a plr_config of the library, by names, and that of a
-recording.
-"""
+"""The settings of a `pelorus.Filter`: a plr_config, by names, and that of a recording."""
 
 from __future__ import annotations
 
@@ -33,8 +31,10 @@ class Configured:
         self._c.config_default(self.memory)
 
     def set(self, name: str, value: Value | Iterable[float]) -> dict[int, float]:
-        """A number, a word, words of a list between commas, or three numbers for three axes; what
-        was set, by id. PelorusError, with what would be right."""
+        """Sets a number, a word, a list of words with commas, or three numbers for three axes.
+
+        Returns what was set, by id; raises PelorusError that says what would be right.
+        """
         if name not in IDS:
             raise PelorusError(f"config: {unknown(name)}; there are {', '.join(sorted(IDS))}")
         number = _number_of(name, value)
@@ -51,13 +51,13 @@ class Configured:
         return {IDS[name]: number}
 
     def get(self, name: str) -> float:
-        """The value in force; of a choice its number."""
+        """Returns the value in force; of a choice its number."""
         if name not in IDS:
             raise PelorusError(unknown(name))
         return float(self._c.config_get(self.memory, self._c.setting_by_name(name.encode())))
 
     def check(self) -> None:
-        """PelorusError where one contradicts another, or what the library was built with."""
+        """Raises PelorusError where one contradicts another, or the library's build options."""
         culprit = c.POINTER(native.Setting)()
         why = self._c.config_why(self.memory, c.byref(culprit))
         if why is not None:
@@ -65,7 +65,7 @@ class Configured:
 
 
 def unknown(name: str) -> str:
-    """That there is no such setting, and which it may have been."""
+    """Returns that there is no such setting, with similar names."""
     near = get_close_matches(name.replace("_", "-"), IDS)
     return f"no setting {name}" + (f": is {' or '.join(near)} meant?" if near else "")
 
@@ -73,8 +73,11 @@ def unknown(name: str) -> str:
 def of_recording(
     messages: Iterable[Message], config: Named, precision: native.Precision
 ) -> tuple[Header, dict[str, float], dict[int, Landmark]]:
-    """HEADER, all settings as a replay of it has them, and the known landmarks: `config` over the
-    recording's CONFIG over what its HEADER suggests over the defaults."""
+    """Returns HEADER, all settings as a replay has them, and the known landmarks.
+
+    `config` overrides the recording's CONFIG, which overrides its HEADER's suggestions, which
+    override the defaults.
+    """
     before = list(takewhile(lambda m: m.kind not in DATA_KINDS, messages))
     header = next((m for m in before if isinstance(m, Header)), None)
     if header is None:
@@ -84,7 +87,7 @@ def of_recording(
     wanted: dict[int, float] = {}
     for given in (*_asked_for(before, library), *(own.set(*one) for one in config.items())):
         for id, value in given.items():
-            wanted.pop(id, None)  # what is set later stands behind: one axis, or all
+            wanted.pop(id, None)  # what is set later comes last: one axis, or all
             wanted[id] = value
     frames = encode(header, 0) + encode(Config(wanted), 1)
     composed, culprit = Configured(library), c.POINTER(native.Setting)()
@@ -97,7 +100,7 @@ def of_recording(
 
 
 def _asked_for(messages: Iterable[Message], library: native.Library) -> Iterator[dict[int, float]]:
-    """By a recording's CONFIG; what no setting allows is left out, as by a session."""
+    """Yields what a recording's CONFIG sets; invalid values are ignored, as by a session."""
     scratch = Configured(library)
     for m in messages:
         if isinstance(m, Config) and not m.build_fingerprint:
@@ -108,7 +111,7 @@ def _asked_for(messages: Iterable[Message], library: native.Library) -> Iterator
 
 
 def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float, float, float]:
-    """A setting's value as the library takes it; of three axes three."""
+    """Returns a setting's value as the library takes it: one number, or three for three axes."""
     if isinstance(value, str):
         return float(_of_words(name, value))
     if isinstance(value, bool | int | float | np.number):
@@ -120,7 +123,7 @@ def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float
 
 
 def _of_words(name: str, value: str) -> int:
-    """The number of a choice, or the bits of a list."""
+    """Returns the number of a choice, or the bits of a list."""
     setting = schema.SETTINGS[IDS[name]]
     asked = [] if setting.is_list and value == "off" else value.split(",")
     if set(asked) <= set(setting.words) and (setting.is_list or len(asked) == 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Errors beside what was claimed of them."""
+"""Compares errors with their covariances."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Figures = dict[str, float | int | None]
 
 
 def nees_per_dof(error: Floats, P: Floats) -> Floats:
-    """e^T P^-1 e / d of (n, d) and (n, d, d); NaN where P is not positive."""
+    """Returns e^T P^-1 e / d of (n, d) and (n, d, d); NaN where P is not positive."""
     out = np.full(len(error), np.nan)
     finite = np.nonzero(np.isfinite(P).all(axis=(1, 2)))[0]
     sound = finite[np.linalg.eigvalsh(P[finite])[:, 0] > 0]
@@ -21,10 +21,10 @@ def nees_per_dof(error: Floats, P: Floats) -> Floats:
 
 
 def rms(errors: Floats) -> float:
-    """Root of the mean squared norm of the rows."""
+    """Returns the root of the mean squared norm of the rows."""
     return float(np.sqrt(np.mean(np.sum(errors**2, axis=-1))))
 
 
 def mean(values: Floats) -> float | None:
-    """Of those that are numbers; None if there is none."""
+    """Returns the mean of the finite values; None if there is none."""
     return float(np.nanmean(values)) if np.isfinite(values).any() else None

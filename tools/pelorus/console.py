@@ -26,20 +26,21 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
-# Control, format (these turn the direction of what follows), surrogate: what is not to be printed.
+# Categories that are not printed: control, format (which may change the text's direction),
+# surrogate.
 UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")
 LAYOUT = "\n\t"
 
 
 def shown(words: str) -> str:
-    r"""The words with what a terminal would obey made visible: ESC becomes \x1b."""
+    r"""Returns the words with control characters made visible: ESC becomes \x1b."""
     if words.isprintable():
         return words
     return "".join(c if _harmless(c) else _escape(ord(c)) for c in words)
 
 
 def one_line(words: str) -> str:
-    """What another program says, in a line of ours: it cannot begin one itself."""
+    """Returns another program's words in one line, so that they cannot begin a line of ours."""
     return words.replace("\n", "\\n")
 
 
@@ -52,7 +53,7 @@ def _escape(code: int) -> str:
 
 
 class SafeConsole(Console):
-    """Every string that is printed, in a table too, goes through `shown`."""
+    """A console that passes every printed string, also in tables, through `shown`."""
 
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str(shown(text), **options)
@@ -64,7 +65,7 @@ err = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
 def print_json(found: dict[str, Any]) -> None:
-    """One object, the whole output of a command. What is not finite has no number in JSON: null."""
+    """Prints one object, the whole output of a command; numbers that are not finite become null."""
     out.print(json.dumps(_finite(found), indent=2, allow_nan=False), markup=False)
 
 
@@ -77,16 +78,16 @@ def _finite(value: Any) -> Any:
 
 
 def leave_standard_output() -> None:
-    """Results go where errors go: the standard output is a file's."""
+    """Redirects results to the errors' stream, for standard output is a file's."""
     out.stderr = True
 
 
-SAID_EVERY_S = 10.0  # where there is no terminal
+SAID_EVERY_S = 10.0  # without a terminal
 
 
 @dataclass
 class _Told:
-    """How far the command is, and when that was last said."""
+    """How far the command is, and when that was last printed."""
 
     steps: int = 0
     step: int = 0
@@ -98,7 +99,7 @@ class _Told:
         return f"step {self.step} of {self.steps}, {self.words}: {what}" if self.steps else what
 
     def say(self, words: str) -> None:
-        """A line, if none was printed for long."""
+        """Prints a line, unless one was printed recently."""
         if err.is_terminal or self.clock() - self.said_s < SAID_EVERY_S:
             return
         self.said_s = self.clock()
@@ -110,7 +111,7 @@ told = _Told()
 
 @contextmanager
 def steps(count: int) -> Iterator[None]:
-    """A whole command, of so many steps; where one command runs another the outer one counts."""
+    """Begins a command of so many steps; where one command runs another the outer one counts."""
     if told.steps:
         yield
         return
@@ -122,12 +123,12 @@ def steps(count: int) -> Iterator[None]:
 
 
 def step(words: str) -> None:
-    """The next one begins."""
+    """Begins the next step."""
     told.step, told.words = min(told.step + 1, told.steps), words
 
 
 def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterator[Item]:
-    """A bar on a terminal, a line every ten seconds elsewhere."""
+    """Yields the items, with a bar on a terminal, a line every ten seconds elsewhere."""
     label = told.label(what)
     if err.is_terminal:
         yield from track(items, label, total, console=err, transient=True)
@@ -143,9 +144,7 @@ VERDICT_COLOURS = {"good": "green", "care": "yellow", "bad": "red"}
 
 
 def tell_verdict(verdict: Verdict) -> None:
-    """In its colour, with the reasons and what to set: the first lines of every command that has
-    one.
-    """
+    """Prints a verdict in its colour, with reasons and settings, before a command's result."""
     head, *why = verdict.lines()
     out.print(f"[bold {VERDICT_COLOURS[verdict.mark]}]{escape(head)}[/]")
     for words in why:
@@ -154,7 +153,7 @@ def tell_verdict(verdict: Verdict) -> None:
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """For one piece of work that cannot say how far it is: a sign of life on a terminal."""
+    """Shows a sign of life on a terminal during work whose progress is unknown."""
     told.say(told.label(what))
     if not err.is_terminal:
         yield

@@ -14,7 +14,7 @@ OTHERS = ("pelorus", "pelorus-cli")
 
 
 def pip_install(extra: str) -> str:
-    """Returns the command that brings an extra."""
+    """Returns the command that installs an extra."""
     return f"pip install '{NAME}[{extra}]'"
 
 

@@ -13,18 +13,18 @@ from pelorus.frames import Landmark, Pose
 from pelorus.layout import Floats, unpack_symmetric
 
 SIGMAS = 3.0
-POINT_M = 0.02  # half the size of a landmark whose ellipsoid would say nothing
+POINT_M = 0.02  # half the size of a landmark without a useful ellipsoid
 
 
 class Ellipsoids(NamedTuple):
-    """Half axes (n, 3), m, and the turn of the axes (n, 4), x y z w."""
+    """Half axes (n, 3), m, and the rotation of the axes (n, 4), x y z w."""
 
     half_m: Floats
     turn: Floats
 
 
 def ellipsoids(P: Floats) -> Ellipsoids:
-    """Of covariances (n, 3, 3); one that is none becomes a point."""
+    """Returns the ellipsoids of covariances (n, 3, 3); an invalid one becomes a point."""
     good = np.isfinite(P).all(axis=(1, 2), keepdims=True)
     variances, axes = np.linalg.eigh(np.where(good, P, 0.0))
     axes[np.linalg.det(axes) < 0, :, 0] *= -1
@@ -33,15 +33,17 @@ def ellipsoids(P: Floats) -> Ellipsoids:
 
 
 def of_pose(pose: Pose) -> Ellipsoids | None:
-    """Of the position, along the body's axes; None where nothing is known of it."""
+    """Returns the position's ellipsoid, along the body's axes; None without a covariance."""
     if not pose.knows_covariance:
         return None
     return ellipsoids(unpack_symmetric(np.asarray(pose.covariance)[None], 6)[:, :3, :3])
 
 
 def of_landmarks(landmarks: Sequence[Landmark], from_W_m: Floats) -> Ellipsoids:
-    """Along the world's axes; `from_W_m` (3,) or (n, 3) is where the body saw them from. One that
-    reaches as far as that is away does not say where the landmark is: it becomes a point.
+    """Returns landmarks' ellipsoids along the world's axes.
+
+    `from_W_m` (3,) or (n, 3) is where the body saw them from. An ellipsoid that reaches there is of
+    no use, and becomes a point.
     """
     if not landmarks:
         return Ellipsoids(np.zeros((0, 3)), np.zeros((0, 4)))

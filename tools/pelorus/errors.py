@@ -11,18 +11,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-PART_FOLDER = ".part"  # in a folder: what is not yet whole
+PART_FOLDER = ".part"  # folder for incomplete files
 STANDARD_OUTPUT = Path("-")
 TEXT_BYTES_MAX = 1 << 20  # of settings and other small files
 
 
 class PelorusError(Exception):
-    """Says what is wrong, where, and what would be right."""
+    """An error that says what is wrong, where, and what would be right."""
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Where the system does not let a file be written, say which and why."""
+    """Turns the system's error in writing a file into one that names file and reason."""
     try:
         yield
     except OSError as error:
@@ -30,15 +30,16 @@ def writing(path: Path) -> Iterator[None]:
 
 
 class Existing:
-    """What becomes of files that are there already. Under a command they are kept, unless the user
-    said --force; who calls the functions himself knows what he does.
+    """Whether existing files are overwritten.
+
+    Commands keep them unless the user says --force; callers of the functions overwrite them.
     """
 
     overwritten = True
 
     @classmethod
     def keep(cls, *paths: Path) -> None:
-        """PelorusError if one of them is a file, and may not be overwritten."""
+        """Raises PelorusError if one of them is a file, and must not be overwritten."""
         for path in paths:
             if path.is_file() and not cls.overwritten:
                 raise PelorusError(
@@ -48,10 +49,10 @@ class Existing:
 
 @contextmanager
 def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
-    """Where to write files that shall be whole: they get their names when all are written, and if
-    that fails nothing of them is left behind. What is there already and is no file, a pipe or
-    /dev/null, is written to as it stands: a file that took its name would put an end to it. A link
-    keeps pointing at its file, and - is the standard output.
+    """Yields paths to write; the files get their own names when all are complete, else are removed.
+
+    A pipe or /dev/null is written directly, for a file in its place would end it. A link keeps
+    pointing at its file, and - is the standard output.
     """
     if paths == (STANDARD_OUTPUT,):
         with _collected() as part:
@@ -77,7 +78,7 @@ def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
 
 @contextmanager
 def _collected() -> Iterator[Path]:
-    """A file that goes to the standard output when it is whole."""
+    """Yields a file that goes to the standard output when it is complete."""
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         part = Path(folder) / "out"
         yield part
@@ -87,13 +88,13 @@ def _collected() -> Iterator[Path]:
 
 
 def _file_of(path: Path) -> Path:
-    """The file that a link stands for; of /dev/stdout the link is all that has a name."""
+    """Returns the file to which a link points; /dev/stdout stays, for only the link has a name."""
     opens_no_file = path.exists() and not path.is_file()
     return resolved(path) if path.is_symlink() and not opens_no_file else path
 
 
 def resolved(path: Path) -> Path:
-    """The path behind all links; PelorusError where they lead back to themselves."""
+    """Returns the path behind all links; raises PelorusError where they lead back to themselves."""
     try:
         return path.resolve()
     except (OSError, RuntimeError) as error:  # the latter until Python 3.12
@@ -101,19 +102,19 @@ def resolved(path: Path) -> Path:
 
 
 def _part(file: Path) -> Path:
-    """Where to write a file until it is whole; of a device or a pipe itself."""
+    """Returns where to write a file until it is complete; a device or a pipe itself."""
     is_device = file.exists() and not file.is_file() and not file.is_dir()
     return file if is_device else file.with_name(file.name + ".part")
 
 
 def write_text(path: Path, text: str) -> None:
-    """The whole file, or nothing of it. What is no UTF-8, as in a file's name, is escaped."""
+    """Writes the whole file, or nothing of it; escapes what is not UTF-8, as in a file's name."""
     with whole(path) as (part,), writing(path):
         part.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def made(folder: Path) -> Path:
-    """The folder, which is there from now on."""
+    """Creates the folder if need be, and returns it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -123,8 +124,10 @@ def made(folder: Path) -> Path:
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """Where to make files that belong together: they move into the folder when all are made, in
-    place of those of their names, and if that fails nothing of them is left behind.
+    """Yields a folder for files that belong together.
+
+    They move into the given folder when all are complete, in place of files of their names; if that
+    fails nothing of them remains.
     """
     absent = [path for path in (folder, *folder.parents) if not path.exists()]
     part = folder / PART_FOLDER
@@ -150,7 +153,7 @@ def _move(part: Path, folder: Path) -> None:
 
 
 def read_text(path: Path) -> str:
-    """A text file as it is; PelorusError where it is none, or no end of it comes."""
+    """Returns a text file's content; raises PelorusError where it is none, or does not end."""
     try:
         with path.open("rb") as stream:
             found = stream.read(TEXT_BYTES_MAX + 1)
@@ -164,8 +167,9 @@ def read_text(path: Path) -> str:
 
 
 def gives_up_output() -> bool:
-    """Whether it is standard output that fails: then it does not take a line more. From here on it
-    goes nowhere, or Python would complain once more while leaving.
+    """Returns whether standard output fails, and if so discards all further output.
+
+    Otherwise Python would report it once more at its exit.
     """
     try:
         sys.stdout.flush()

@@ -64,7 +64,7 @@ MEANING = {
 
 @dataclass(frozen=True)
 class Accuracy:
-    """At the n frames with truth, the truth brought to the estimate's start.
+    """Errors at the n frames with truth, which is moved to the estimate's start.
 
     error (n, 6) is Log(T^-1 A T_true), (rho, theta), m and rad; P (n, 6, 6) its covariance, sigma
     (n, 6); nees = e^T P^-1 e / 6 (n,), NaN at the first frame and where P is not positive.
@@ -94,7 +94,7 @@ class Accuracy:
 
     @property
     def sim3(self) -> Figures:
-        """ATE with the best scale of the estimate, and that scale: as of one camera's way."""
+        """Returns the ATE with the best scale, and that scale, as for one camera's path."""
         fit, scale = similarity_fit(self.estimate.p, self.truth.p)
         off = self.truth.p - scale * self.estimate.p @ fit.R.T - fit.p
         return {"ate_sim3_m": rms(off), "scale": scale}
@@ -122,9 +122,10 @@ def assess(
     tolerance_ns: int = 0,
     upright: bool = False,
 ) -> Accuracy | None:
-    """None if no pose has a truth of equal time. `covariance` (n, 6, 6), NaN where unknown.
+    """Compares a trajectory with the truth; None if no pose has a truth of equal time.
 
-    `upright`: the filter knows the vertical, as with an IMU.
+    `covariance` (n, 6, 6), NaN where unknown. `upright`: the filter knows the vertical, as with an
+    IMU.
     """
     mine, theirs = match(estimate, truth, tolerance_ns)
     if not len(mine):
@@ -147,17 +148,17 @@ def assess(
     error = se3.log(se3.compose(se3.inverse(T), aligned))
     sigma = np.sqrt(np.clip(np.diagonal(P, axis1=1, axis2=2), 0, None))
     nees = nees_per_dof(error, P)
-    nees[0] = np.nan  # its error is zero by the alignment: it says nothing
+    nees[0] = np.nan  # the alignment makes this error zero
     return Accuracy(estimate.t_ns[mine], T, aligned, A, error, P, sigma, nees)
 
 
 def _onto(T: Poses, T_true: Poses) -> Poses:
-    """A with T = A T_true."""
+    """Returns A with T = A T_true."""
     return se3.compose(T, se3.inverse(T_true))
 
 
 def about_vertical(T: Poses, T_true: Poses) -> Poses:
-    """A that turns about the vertical alone, brings p_true to p, and R_true as near R as it can."""
+    """Returns A that turns about the vertical alone, and maps T_true to T as well as it can."""
     between = T.R @ T_true.R.T
     x, y = between[0, 0] + between[1, 1], between[1, 0] - between[0, 1]
     cosine, sine = np.array([x, y]) / np.hypot(x, y)
@@ -166,10 +167,11 @@ def about_vertical(T: Poses, T_true: Poses) -> Poses:
 
 
 def world_laid(P: Floats) -> int:
-    """The last frame whose position is known as it was set: alike along all axes, and by itself.
+    """Returns the last frame whose position covariance is still the initial one: equal and
+    uncorrelated.
 
-    The first one if there is none such: then the world was laid before it. And if the last frame of
-    all is such a one: then the filter has never started.
+    It is the first frame if there is none: then the world was placed before it. If it is the last
+    frame of all, the filter has never started.
     """
     rho, cross = P[:, :3, :3], P[:, :3, 3:]
     alike = (rho == rho[:, :1, :1] * np.eye(3)).all(axis=(1, 2))
@@ -178,8 +180,9 @@ def world_laid(P: Floats) -> int:
 
 
 def is_as_set(P: Floats) -> bool:
-    """Whether a pose is known as it was set, with one sigma of m and rad: before the filter starts,
-    or where nothing has moved yet.
+    """Returns whether a pose has its initial covariance, with one sigma of m and rad.
+
+    That is before the filter starts, or where nothing has moved yet.
     """
     return np.array_equal(P, P[0, 0] * np.eye(len(P)))
 
@@ -187,7 +190,7 @@ def is_as_set(P: Floats) -> bool:
 def match(
     estimate: Trajectory, truth: Trajectory, tolerance_ns: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Indices of the poses of equal time, each truth used once."""
+    """Returns indices of the poses of equal time, each truth used once."""
     nearest = motion.nearest(truth.t_ns, estimate.t_ns)
     good = np.nonzero(np.abs(truth.t_ns[nearest] - estimate.t_ns) <= tolerance_ns)[0]
     _, first = np.unique(nearest[good], return_index=True)
@@ -195,7 +198,7 @@ def match(
 
 
 def rigid_fit(source: Floats, target: Floats) -> Poses:
-    """The rigid motion, no scale, with the least squared distance of (n, 3) to (n, 3).
+    """Returns the rigid motion, without scale, that fits (n, 3) to (n, 3) by least squares.
 
     Umeyama, Least-squares estimation of transformation parameters between two point patterns, 1991.
     """
@@ -205,8 +208,9 @@ def rigid_fit(source: Floats, target: Floats) -> Poses:
 
 
 def similarity_fit(source: Floats, target: Floats) -> tuple[Poses, float]:
-    """The rigid motion and the scale with the least squared distance of s source to target: as
-    `rigid_fit`, Umeyama's equation 42.
+    """Returns the rigid motion and the scale s of the least-squares fit of s source to target.
+
+    Umeyama's equation 42, as `rigid_fit`.
     """
     fit = rigid_fit(source, target)
     a, b = source - source.mean(axis=0), target - target.mean(axis=0)
@@ -216,7 +220,7 @@ def similarity_fit(source: Floats, target: Floats) -> tuple[Poses, float]:
 
 
 def beside(other: Trajectory, own: Trajectory, tolerance_ns: int) -> Trajectory | None:
-    """Another program's way, from its world brought to this one where both first have a pose."""
+    """Returns another program's path, moved to this world where both first have a pose."""
     mine, theirs = match(own, other, tolerance_ns)
     if not len(mine):
         return None
@@ -226,13 +230,13 @@ def beside(other: Trajectory, own: Trajectory, tolerance_ns: int) -> Trajectory 
 
 
 def step_change(poses: Poses) -> float:
-    """How erratic a trajectory is: RMS change of the body's step from one pose to the next, m."""
+    """Returns how erratic a trajectory is: RMS change of the step from one pose to the next, m."""
     steps = np.einsum("nij,ni->nj", poses.R[:-1], np.diff(poses.p, axis=0))
     return rms(np.diff(steps, axis=0)) if len(steps) > 1 else 0.0
 
 
 def path_m(poses: Poses) -> float:
-    """Length of the way."""
+    """Returns the length of the path."""
     return float(np.linalg.norm(np.diff(poses.p, axis=0), axis=1).sum())
 
 
@@ -240,18 +244,18 @@ def path_m(poses: Poses) -> float:
 
 
 def made_in(messages: Sequence[Message]) -> list[Landmark]:
-    """The landmarks that a filter left behind, evicted and final."""
+    """Returns the landmarks that a filter left behind, evicted and final."""
     return [m for m in messages if isinstance(m, Landmark) and m.role != Role.KNOWN]
 
 
 def known_in(messages: Sequence[Message]) -> list[Landmark]:
-    """The landmarks that a recording knows; none whose place is not finite."""
+    """Returns the known landmarks of a recording; positions that are not finite are left out."""
     known = [m for m in messages if isinstance(m, Landmark) and m.role == Role.KNOWN]
     return [m for m in known if np.isfinite(m.p_W_m).all()]
 
 
 def sigmas_m(landmarks: Sequence[Landmark]) -> Floats:
-    """(n,): root of the mean variance of an axis."""
+    """Returns (n,) the root of the mean variance of an axis."""
     packed = np.array([m.covariance for m in landmarks]).reshape(-1, 6)
     trace = np.trace(unpack_symmetric(packed, 3), axis1=1, axis2=2)
     return np.asarray(np.sqrt(np.where(trace >= 0, trace, np.nan) / 3))
@@ -260,7 +264,7 @@ def sigmas_m(landmarks: Sequence[Landmark]) -> Floats:
 def map_figures(
     made: Sequence[Landmark], known: Sequence[Landmark], A: Poses = se3.IDENTITY
 ) -> Figures:
-    """A filter's landmarks against known ones, which A brings to its world."""
+    """Compares a filter's landmarks with known ones, which A maps to its world."""
     places = {landmark.id: landmark.p_W_m for landmark in known}
     mine = [m for m in made if m.id in places]
     if not mine:
@@ -287,17 +291,17 @@ OF_POSES = ("err0_m", "ate_m", "rot_deg", "nees_per_dof", "nees_left_out")
 
 
 def is_mapping(messages: Sequence[Message]) -> bool:
-    """Whether the poses were given: then their error says nothing."""
+    """Returns whether the poses were given, so that their error means nothing."""
     return mode_in_force(messages) == "mapping"
 
 
 def by_imu(messages: Sequence[Message]) -> bool:
-    """Whether an IMU moved the filter that left this result."""
+    """Returns whether an IMU moved the filter of this result."""
     return bool(in_force(messages, "process"))
 
 
 def _found_by_itself(messages: Sequence[Message]) -> list[Landmark]:
-    """What the filter made; without the known ones that it was located by."""
+    """Returns the landmarks that the filter made, without the known ones of its map."""
     made = made_in(messages)
     if mode_in_force(messages) == "localization" or in_force(messages, "known-map"):
         given = {m.id for m in known_in(messages)}
@@ -308,7 +312,7 @@ def _found_by_itself(messages: Sequence[Message]) -> list[Landmark]:
 def on_its_clock(
     messages: Sequence[Message], truth: Trajectory, estimate: Trajectory
 ) -> Trajectory:
-    """With a camera-offset the result's poses lie between those of the truth."""
+    """Returns the truth on the result's clock, which a camera-offset shifts."""
     return filled(truth, estimate.t_ns) if in_force(messages, "camera-offset") else truth
 
 
@@ -319,9 +323,9 @@ def judge(
     tolerance_ns: int = 0,
     truths: Sequence[Message] = (),
 ) -> Figures:
-    """A result against truth and known landmarks, by default its own.
+    """Compares a result with truth and known landmarks, by default its own.
 
-    `truths` are the messages that may say more of the truth than its poses.
+    `truths` are messages that may have more of the truth than its poses.
     """
     truth = truth_in(messages) if truth is None else truth
     found = estimate_in(messages)

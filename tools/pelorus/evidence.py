@@ -19,7 +19,7 @@ _ROW = row_type(schema.MESSAGES["EVIDENCE"].rows)
 
 
 class EvidenceFlag(IntFlag):
-    """What an EVIDENCE says yes to."""
+    """Flags of an EVIDENCE."""
 
     APPLIED = 1
     OUTRIGHT = 2
@@ -33,7 +33,7 @@ class EvidenceFlag(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class Evidence(Message, kind=Kind.EVIDENCE):
-    """What the supervisor saw in one frame, and what it decided: docs/SUPERVISION.md.
+    """What the supervisor saw in one frame and decided: docs/SUPERVISION.md.
 
     `rejected` are landmarks that were seen and not used: id, why, in_succession, mean2.
     """

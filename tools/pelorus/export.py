@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a filter found as files for other programs: landmarks as CSV or PLY, the way as TUM."""
+"""Writes what a filter estimated for other programs: landmarks as CSV or PLY, the path as TUM."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ end_header
 
 
 def write_map(path: Path, landmarks: Sequence[Landmark]) -> None:
-    """In the format that the name asks for."""
+    """Writes the landmarks in the format of the file's name."""
     if path.suffix not in (".csv", ".ply"):
         raise PelorusError(f"{path}: is neither .csv nor .ply")
     text = _csv(landmarks) if path.suffix == ".csv" else _ply(landmarks)
@@ -40,9 +40,7 @@ def write_map(path: Path, landmarks: Sequence[Landmark]) -> None:
 
 
 def write_tum(path: Path, messages: Sequence[Message]) -> None:
-    """The body's poses after each frame, in the form that `evaluate` and evo read; times to the
-    nanosecond.
-    """
+    """Writes the body's poses after each frame, to the nanosecond, for `evaluate` and evo."""
     found = estimate_in(messages)
     if found is None:
         raise PelorusError("there is no pose after a frame to write")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Packages that a plain install has not, for together they are larger than all else: loaded where
-something of them is first used. Where one is missing the user is told which extra brings it.
+"""Optional packages, which together are larger than all else, imported at first use.
+
+Where one is missing the user is told which extra installs it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pelorus.errors import PelorusError
 
 __all__ = ["cv2", "extra", "figures_missing"]
 
-# By the name that is imported: what needs it, and the extra.
+# By the imported name: what needs it, and its extra.
 EXTRAS = {
     "cv2": ("pictures need OpenCV", "vision"),
     "PIL": ("pictures need Pillow", "vision"),
@@ -36,7 +37,7 @@ def _missing(package: str) -> str:
 
 @contextmanager
 def extra(package: str) -> Iterator[None]:
-    """Around the imports of one."""
+    """Guards the imports of an optional package."""
     try:
         yield
     except ImportError as error:
@@ -44,7 +45,7 @@ def extra(package: str) -> Iterator[None]:
 
 
 def figures_missing() -> str:
-    """What to say of drawings that are left out; nothing where they can be made."""
+    """Returns a remark on drawings that are left out; empty where they can be made."""
     return "" if find_spec("matplotlib") else _missing("matplotlib")
 
 

@@ -46,7 +46,7 @@ COEFFICIENTS_MAX = 8
 
 
 class TrackEnd(IntEnum):
-    """Why a track ended: plr_track_end."""
+    """Reasons of a track's end: plr_track_end."""
 
     LEFT_VIEW = 1
     UNLIKE = 2
@@ -57,7 +57,7 @@ class TrackEnd(IntEnum):
 
 
 class PictureFault(IntFlag):
-    """What is wrong with a picture: plr_picture_fault."""
+    """Faults of a picture: plr_picture_fault."""
 
     DARK = 1
     BRIGHT = 2
@@ -67,8 +67,11 @@ class PictureFault(IntFlag):
 
 @dataclass(frozen=True)
 class Seen:
-    """What a pair shows: `observations` for Filter.update at t_ns, `sights` beside them (id, age,
-    sigma_px, likeness), the tracks that `ended` (id, age, why), and the report."""
+    """The result for a pair.
+
+    `observations` are for Filter.update at t_ns, `sights` are about each of them (id, age,
+    sigma_px, likeness), `ended` are the tracks that ended (id, age, why); and the report.
+    """
 
     t_ns: int
     observations: NDArray[np.void]
@@ -78,7 +81,7 @@ class Seen:
 
     @property
     def pixels(self) -> NDArray[np.float32]:
-        """(n, 4) uL vL uR vR."""
+        """Returns (n, 4) uL vL uR vR, px."""
         return np.stack([self.observations[name] for name in PIXELS], axis=-1)
 
 
@@ -95,7 +98,7 @@ class Tracker:
         camera: Camera | None = None,
         precision: Precision = "float32",
     ) -> None:
-        """`camera` is the virtual camera, where it is not left to the library to choose one."""
+        """Makes a tracker; `camera` is the virtual camera, by default the library's choice."""
         self._library = native_vision.library(precision)
         most = c.c_uint32()
         self.pixels_max = self._library.binding_vision_limits(c.byref(most))
@@ -121,7 +124,7 @@ class Tracker:
     def rectified(
         cls, camera: Calibration | Camera, width_px: int, height_px: int, **how: object
     ) -> Self:
-        """Of pictures that are rectified already."""
+        """Returns a tracker for pictures that are rectified already."""
         four = (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px)
         lens = Lens(LensModel.NONE, four, (), width_px, height_px)
         T_RL = Poses(np.eye(3), np.array([-camera.baseline_m, 0, 0]))
@@ -131,7 +134,11 @@ class Tracker:
     def from_files(
         cls, paths: Sequence[str | Path], width_px: int, height_px: int, **how: object
     ) -> Self:
-        """Of any calibration that `pelorus convert` reads: Kalibr, OpenCV, Basalt, VINS ..."""
+        """Returns a tracker for any calibration of `pelorus convert`: Kalibr, OpenCV, Basalt, VINS
+        ...
+
+        Raises PelorusError if the files do not have two cameras.
+        """
         from pelorus.rig import read  # noqa: PLC0415 - reads files, which most callers do not
 
         found = read.read(tuple(Path(path) for path in paths), "eyes").rig
@@ -142,8 +149,10 @@ class Tracker:
     def calibration(
         self, R_LB: ArrayLike | None = None, t_LB_m: ArrayLike = (0, 0, 0)
     ) -> Calibration:
-        """The virtual camera, for a Filter: a point s_B of the body is R_LB s_B + t_LB_m in the
-        left camera."""
+        """Returns the virtual camera for a Filter.
+
+        A point s_B of the body is R_LB s_B + t_LB_m in the left camera.
+        """
         told = NativeCalibration()
         where = _pose(np.eye(3) if R_LB is None else np.asarray(R_LB), np.asarray(t_LB_m))
         self._call(
@@ -168,9 +177,11 @@ class Tracker:
         depths: tuple[ArrayLike, ArrayLike] | None = None,
         t_right_ns: int | None = None,
     ) -> Seen:
-        """The next pair: uint8 (rows, columns). `motion` (R, p) is how points are expected to have
-        moved since the last one, x -> R x + p in the virtual camera; `depths` (ids, z_m) what is
-        known of tracks' distances."""
+        """Tracks the next pair, uint8 (rows, columns).
+
+        `motion` (R, p) is how points are expected to have moved since the last pair, x -> R x + p
+        in the virtual camera; `depths` (ids, z_m) are known depths of tracks.
+        """
         lefts, rights = _grey("left", left), _grey("right", right)
         pair = native_vision.Pair(
             _picture(lefts, t_ns), _picture(rights, t_ns if t_right_ns is None else t_right_ns)

@@ -50,7 +50,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-# One landmark in a rectified stereo pair, as the library has it: id and four pixels.
+# One landmark in a rectified stereo pair, as in the library: id and four pixels.
 OBSERVATION = np.dtype(
     [("id", "<u4"), ("uL_px", "<f4"), ("vL_px", "<f4"), ("uR_px", "<f4"), ("vR_px", "<f4")]
 )
@@ -89,8 +89,10 @@ class KnownLandmark(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """A rectified stereo camera and its place on the body: a point s_B of the body is
-    R_CB s_B + t_CB_m in the left camera; R_CB (3, 3), t_CB_m (3,)."""
+    """A rectified stereo camera and its place on the body.
+
+    A point s_B of the body is R_CB s_B + t_CB_m in the left camera; R_CB (3, 3), t_CB_m (3,).
+    """
 
     fx_px: float
     fy_px: float
@@ -102,20 +104,23 @@ class Calibration:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Self:
-        """Of a calibration.json, as `pelorus convert` takes it."""
+        """Reads a calibration.json, as for `pelorus convert`."""
         from pelorus import calibration  # noqa: PLC0415 - reads files, which most callers do not
 
         return cls.of_header(calibration.read(Path(path)))
 
     @classmethod
     def of_header(cls, header: Any) -> Self:
-        """Of a recording's HEADER."""
+        """Returns the calibration of a recording's HEADER."""
         return cls(**vars(header.camera), R_CB=header.R_CB, t_CB_m=header.t_CB_m)
 
 
 def observations(ids: ArrayLike, pixels: ArrayLike) -> NDArray[np.void]:
-    """Observations of a frame: ids (n,), 0 to 2^32 - 1, also as floats that are whole numbers (a
-    column of a table); pixels (n, 4) of (uL, vL, uR, vR)."""
+    """Returns the observations of a frame for Filter.update.
+
+    ids (n,), 0 to 2^32 - 1, may be floats with whole values (a column of a table); pixels are (n,
+    4) of (uL, vL, uR, vR).
+    """
     numbers, places = np.asarray(ids), np.asarray(pixels)
     if numbers.ndim != 1 or (numbers.size and not are_whole(numbers)):
         raise PelorusError(f"ids: {kind_of(numbers)}; whole numbers of shape (n,) are wanted")
@@ -176,7 +181,7 @@ class Filter:
         )
         pointers = (c.byref(part) for part in (given, self._config.memory, self._callbacks, sizes))
         self._checked("init", self._c.filter_init_sized(self._f, *pointers))
-        # Made once: a frame makes no object but its report.
+        # Made once: a frame creates no object but its report.
         self._twist, self._frame, self._report = native.Twist(), native.Frame(), native.Report()
         self._twist_at, self._frame_at = c.addressof(self._twist), c.addressof(self._frame)
         self._linear = np.ctypeslib.as_array(self._twist.linear)
@@ -193,9 +198,12 @@ class Filter:
         *,
         precision: Precision = "float32",
     ) -> Self:
-        """As `pelorus-replay` makes it for these messages of a recording: its calibration and known
-        landmarks, and `config` over the recording's CONFIG over what its HEADER says of noises.
-        The pose at the start, from its START or TRUTH, is the caller's to set."""
+        """Returns the filter that `pelorus-replay` makes for these messages of a recording.
+
+        It has the recording's calibration and known landmarks; `config` overrides its CONFIG, which
+        overrides the noises of its HEADER. The caller sets the initial pose, from its START or
+        TRUTH.
+        """
         header, settings, known = of_recording(messages, config or {}, precision)
         given = {
             id: KnownLandmark(m.p_W_m, unpack_symmetric(m.covariance[None], 3)[0])
@@ -213,7 +221,7 @@ class Filter:
         )
 
     def setting(self, name: str) -> float:
-        """The value in force; of a choice its number."""
+        """Returns the value in force; of a choice its number."""
         return self._config.get(name)
 
     # --- the map, called by the library
@@ -237,43 +245,45 @@ class Filter:
             raise FilterError(call, status, self._c.text(status) + hint.get(status, ""))
 
     def _other_process(self, call: str) -> str:
-        """What to say where a reading is of the other process, whose readings `call` takes."""
+        """Returns a hint if a reading belongs to the other process than `call` does."""
         process = schema.word_of("process", self.setting("process"))
         return f'; this filter was made with {{"process": "{process}"}}: give readings to {call}'
 
     def reset(self) -> None:
-        """As after the beginning, all counts zero."""
+        """Resets to the initial state, with all counts zero."""
         self._checked("reset", self._c.filter_reset(self._f))
 
     def set_pose(
         self, t_ns: int, R_WB: ArrayLike, p_WB_m: ArrayLike, covariance: ArrayLike | None = None
     ) -> None:
-        """Sets pose and time, at the start or later; landmarks are dropped. `covariance` (6, 6) of
-        (rho, theta), m and rad in the body's axes; None: start-sigma."""
+        """Sets pose and time, at the start or later; landmarks are dropped.
+
+        `covariance` (6, 6) is of (rho, theta), m and rad in the body's axes; None: start-sigma.
+        """
         P = None if covariance is None else checked("covariance", covariance, (6, 6))
         pose = _pose("pose", R_WB, p_WB_m)
         time = whole_number("t_ns", t_ns, MOST_NS)
         self._checked("set_pose", self._c.filter_set_pose(self._f, time, c.byref(pose), address(P)))
 
     def set_bias(self, mean: ArrayLike, variance: ArrayLike) -> None:
-        """The prior of the biases, each (6,): of twists (v, w), m/s and rad/s; of an IMU (a, w)."""
+        """Sets the biases' prior, each (6,): of twists (v, w), m/s and rad/s; of an IMU (a, w)."""
         b, V = checked("mean", mean, (6,)), checked("variance", variance, (6,))
         self._checked("set_bias", self._c.filter_set_bias(self._f, address(b), address(V)))
 
     def set_velocity(self, v_B_mps: ArrayLike, variance: ArrayLike) -> None:
-        """With an IMU: its velocity in the body's axes, and variances; each (3,)."""
+        """Sets the velocity in the body's axes and its variances, each (3,); with an IMU only."""
         v, V = checked("v_B_mps", v_B_mps, (3,)), checked("variance", variance, (3,))
         status = self._c.filter_set_velocity(self._f, address(v), address(V))
         self._checked("set_velocity", status)
 
     def move_to(self, t_ns: int, R_WB: ArrayLike, p_WB_m: ArrayLike) -> None:
-        """In the mode mapping: the body's pose at t_ns, which is taken as exact."""
+        """Sets the body's pose at t_ns, which is taken as exact; in the mode mapping only."""
         pose = _pose("pose", R_WB, p_WB_m)
         time = whole_number("t_ns", t_ns, MOST_NS)
         self._checked("move_to", self._c.filter_move_to(self._f, time, c.byref(pose)))
 
     def predict(self, t_ns: int, v_B_mps: ArrayLike, w_B_radps: ArrayLike) -> None:
-        """A twist taken at t_ns: velocity (3,), m/s, and rate (3,), rad/s, in the body's axes."""
+        """Takes a twist at t_ns: velocity (3,), m/s, and rate (3,), rad/s, in the body's axes."""
         self._linear[:] = checked("v_B_mps", v_B_mps, (3,))
         self._angular[:] = checked("w_B_radps", w_B_radps, (3,))
         status = self._predict(self._f, whole_number("t_ns", t_ns, MOST_NS), self._twist_at)
@@ -281,7 +291,7 @@ class Filter:
             self._checked("predict", status, hint={OTHER_MODE: self._other_process("inertial")})
 
     def inertial(self, t_ns: int, a_B_mps2: ArrayLike, w_B_radps: ArrayLike) -> None:
-        """A reading of an IMU at t_ns: specific force (3,), m/s^2, at rest upwards; rate (3,)."""
+        """Takes an IMU's reading: specific force (3,), m/s^2, at rest upwards; rate (3,), rad/s."""
         self._linear[:] = checked("a_B_mps2", a_B_mps2, (3,))
         self._angular[:] = checked("w_B_radps", w_B_radps, (3,))
         status = self._inertial(self._f, whole_number("t_ns", t_ns, MOST_NS), self._twist_at)
@@ -289,8 +299,10 @@ class Filter:
             self._checked("inertial", status, hint={OTHER_MODE: self._other_process("predict")})
 
     def update(self, t_ns: int, observations: NDArray[np.void], budget: int = NO_BUDGET) -> Report:
-        """A stereo frame: what `observations` makes, (n,) of OBSERVATION, read without a copy. At
-        most `budget` of them are used."""
+        """Takes a stereo frame: (n,) of OBSERVATION (`observations`), read without a copy.
+
+        At most `budget` of them are used.
+        """
         if not isinstance(observations, np.ndarray) or observations.dtype != OBSERVATION:
             raise PelorusError("observations: an array as pelorus.observations makes it is wanted")
         seen = np.ascontiguousarray(observations)
@@ -317,9 +329,12 @@ class Filter:
         sigma: ArrayLike,
         at_B_m: ArrayLike = (0, 0, 0),
     ) -> ReadingResult:
-        """A reading of a small sensor: `wheel` (velocity of a point of the body, m/s),
-        `standstill` (value zeros; sigma[0] m/s, sigma[1] rad/s) or `position` (in the world, m).
-        Each (3,); an axis whose sigma is 0 was not measured. at_B_m: where on the body."""
+        """Takes a reading of a small sensor, each (3,).
+
+        The sensors are `wheel` (velocity of a point of the body, m/s), `standstill` (value zeros;
+        sigma[0] m/s, sigma[1] rad/s) and `position` (in the world, m). An axis whose sigma is 0 was
+        not measured. at_B_m is the place on the body.
+        """
         kinds = schema.SENSORS
         if sensor not in kinds:
             raise PelorusError(f"sensor {sensor!r}: one of {', '.join(kinds)}")
@@ -337,44 +352,44 @@ class Filter:
 
     @property
     def time_ns(self) -> int:
-        """Time of the estimate."""
+        """Returns the time of the estimate, ns."""
         return int(self._c.filter_time(self._f))
 
     def _doubles(self, function: str, shape: tuple[int, ...]) -> Floats:
-        """What a function writes as an array of doubles."""
+        """Returns what a function writes as an array of doubles."""
         result = np.empty(shape)
         self._checked(function, getattr(self._c, f"filter_{function}")(self._f, address(result)))
         return result
 
     def pose(self) -> Pose:
-        """The pose of the body in the world, T_WB: R (3, 3), p (3,), m."""
+        """Returns the pose of the body in the world, T_WB: R (3, 3), p (3,), m."""
         numbers = self._doubles("pose", (12,))
         return Pose(numbers[:9].reshape(3, 3), numbers[9:])
 
     def pose_covariance(self) -> Floats:
-        """(6, 6), of (rho, theta), m and rad in the body's axes; truth is T_WB Exp(rho, theta)."""
+        """Returns (6, 6) of (rho, theta), m, rad, body axes; truth is T_WB Exp(rho, theta)."""
         return self._doubles("pose_covariance", (6, 6))
 
     def velocity(self) -> Floats:
-        """(6,): velocity, m/s, and rate, rad/s, of the body in its own axes."""
+        """Returns (6,): velocity, m/s, and rate, rad/s, of the body in its own axes."""
         return self._doubles("velocity", (6,))
 
     def velocity_covariance(self) -> Floats:
-        """(6, 6), in the same order."""
+        """Returns the covariance (6, 6), in the same order."""
         return self._doubles("velocity_covariance", (6, 6))
 
     def trace(self) -> float:
-        """Returns the trace of the whole covariance, whose trend alone means anything."""
+        """Returns the trace of the whole covariance; only its trend means anything."""
         return float(self._c.filter_trace(self._f))
 
     def bias(self) -> tuple[Floats, Floats]:
-        """(6,) and its covariance (6, 6): (b_v, b_w) of twists, (b_a, b_g) of an IMU."""
+        """Returns (6,) and its covariance (6, 6): (b_v, b_w) of twists, (b_a, b_g) of an IMU."""
         b, P = np.empty(6), np.empty((6, 6))
         self._checked("bias", self._c.filter_bias(self._f, address(b), address(P)))
         return b, P
 
     def landmarks(self) -> NDArray[np.void]:
-        """All landmarks in the state, (n,) of LANDMARK: id, p_W_m (3,), P_W_m2 (3, 3) ..."""
+        """Returns all landmarks in the state, (n,) of LANDMARK: id, p_W_m (3,), P_W_m2 ..."""
         count = int(self._c.filter_landmark_count(self._f))
         found = np.zeros(count, LANDMARK)
         for slot in range(count):
@@ -394,20 +409,20 @@ class Filter:
     # --- what happened
 
     def health(self, t_ns: int | None = None) -> Health:
-        """The filter's health at t_ns; None: at the time of the estimate."""
+        """Returns the filter's health at t_ns; None: at the time of the estimate."""
         time = self.time_ns if t_ns is None else whole_number("t_ns", t_ns, MOST_NS)
         health = Health()
         self._checked("health", self._c.filter_health(self._f, time, c.byref(health)))
         return health
 
     def supervision(self) -> Supervision:
-        """What the supervisor saw in the last frame, and decided on it."""
+        """Returns what the supervisor saw in the last frame, and decided."""
         seen = Supervision()
         self._checked("supervision", self._c.filter_supervision(self._f, c.byref(seen)))
         return seen
 
     def totals(self) -> dict[str, int]:
-        """Counts since the beginning, by name."""
+        """Returns counts since the beginning, by name."""
         counts = native.Totals()
         self._checked("totals", self._c.filter_totals(self._f, c.byref(counts)))
         return {name: int(getattr(counts, name)) for name in (*native.COUNTS_32, *native.COUNTS_64)}
@@ -415,7 +430,7 @@ class Filter:
     # --- saved state
 
     def save(self) -> bytes:
-        """The whole state. A filter that restores it goes on with the same bits."""
+        """Returns the whole state; a filter that restores it continues with the same bits."""
         saved = bytearray()
 
         def take(_context: object, data: int, n: int) -> int:
@@ -426,7 +441,7 @@ class Filter:
         return bytes(saved)
 
     def restore(self, saved: bytes) -> None:
-        """Goes on from a saved state of the same calibration, settings and build."""
+        """Continues from a saved state of the same calibration, settings and build."""
         if not isinstance(saved, bytes | bytearray):
             raise PelorusError(
                 f"saved: {type(saved).__name__}; the bytes that save gave are expected"
@@ -440,25 +455,28 @@ class Filter:
         self._checked("restore", self._c.filter_restore(self._f, len(saved), source, None))
 
     def resume(self, t_ns: int, moved: ArrayLike | None = None) -> None:
-        """Continues at t_ns, of any clock, after a pause; `moved` (6, 6) is the covariance of
-        how far the body may have moved meanwhile, as of a pose; None: not at all."""
+        """Continues at t_ns, of any clock, after a pause.
+
+        `moved` (6, 6) is the covariance of how far the body may have moved meanwhile, as of a pose;
+        None: not at all.
+        """
         P = None if moved is None else checked("moved", moved, (6, 6))
         time = whole_number("t_ns", t_ns, MOST_NS)
         self._checked("resume", self._c.filter_resume(self._f, time, address(P)))
 
     @property
     def last_report(self) -> Report:
-        """Returns the last frame's report, of one that was refused too."""
+        """Returns the last frame's report, even if it was refused."""
         return Report.from_buffer_copy(self._report)
 
     @property
     def most_landmarks(self) -> int:
-        """How many the library has room for; the setting `slots` may use fewer."""
+        """Returns the library's capacity of landmarks; the setting `slots` may use fewer."""
         return int(self._c.sizes.landmarks)
 
     @property
     def most_observations(self) -> int:
-        """In one frame."""
+        """Returns the largest number of observations in one frame."""
         return int(self._c.sizes.observations)
 
 

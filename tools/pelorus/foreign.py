@@ -32,10 +32,10 @@ from pelorus.layout import Floats
 
 TEXT_BYTES_MAX = 1 << 30
 JSON_BYTES_MAX = 1 << 20  # a calibration has some hundred
-YAML_BYTES_MAX = 1 << 18  # its reader is slow
+YAML_BYTES_MAX = 1 << 18  # its parser is slow
 YAML_DEPTH_MAX = 50
 ARRAYS_BYTES_MAX = 1 << 31  # unpacked; the course's largest drive has 0.2 GB
-INTEGER_DIGITS_MAX = 20  # 2^64 has as many
+INTEGER_DIGITS_MAX = 20  # digits of 2^64
 BAD_ROWS_MAX = 0.1  # of a file's rows may be left out; more is another fault
 PIECE_BYTES = 1 << 20
 BEGINNING_BYTES = 1 << 17
@@ -49,20 +49,20 @@ ArraysByName = dict[str, NDArray[np.generic]]
 class ForeignFileError(PelorusError):
     """A file is not what it should be: which one, where in it, what is wrong, what would be right.
 
-    `due` is a sentence of its own: "12 numbers are expected".
+    `expected` is a sentence of its own: "12 numbers are expected".
     """
 
-    def __init__(self, path: Path, wrong: str, *, at: str = "", due: str = "") -> None:
-        self.path, self.at, self.wrong, self.due = path, at, wrong, due
+    def __init__(self, path: Path, wrong: str, *, at: str = "", expected: str = "") -> None:
+        self.path, self.at, self.wrong, self.expected = path, at, wrong, expected
         place = f"{path}: {at}" if at else str(path)
-        super().__init__(f"{place}: {wrong}; {due}" if due else f"{place}: {wrong}")
+        super().__init__(f"{place}: {wrong}; {expected}" if expected else f"{place}: {wrong}")
 
 
 # --- bytes and text -------------------------------------------------------------------------------
 
 
 def content(path: Path, most: int) -> bytes:
-    """All bytes of a file or a pipe, if there are no more than `most` and at least one."""
+    """Returns all bytes of a file or a pipe; it must have one at least and `most` at most."""
     pieces, size = [], 0
     try:
         with path.open("rb") as stream:
@@ -70,7 +70,7 @@ def content(path: Path, most: int) -> bytes:
                 size += len(piece)
                 if size > most:
                     raise ForeignFileError(
-                        path, "is too long", due=f"at most {most} bytes are expected"
+                        path, "is too long", expected=f"at most {most} bytes are expected"
                     )
                 pieces.append(piece)
     except OSError as error:
@@ -81,7 +81,7 @@ def content(path: Path, most: int) -> bytes:
 
 
 def beginning(path: Path) -> bytes:
-    """The first bytes of a file, to see what it is."""
+    """Returns the first bytes of a file, which show its format."""
     try:
         with path.open("rb") as stream:
             return stream.read(BEGINNING_BYTES)
@@ -90,7 +90,7 @@ def beginning(path: Path) -> bytes:
 
 
 def ending(path: Path, count: int) -> bytes:
-    """The last bytes of a file."""
+    """Returns the last bytes of a file."""
     try:
         with path.open("rb") as stream:
             stream.seek(max(stream.seek(0, io.SEEK_END) - count, 0))
@@ -100,15 +100,15 @@ def ending(path: Path, count: int) -> bytes:
 
 
 def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
-    """UTF-8, with a byte order mark or without."""
+    """Returns UTF-8 text, with or without a byte order mark."""
     raw = content(path, most)
     try:
         found, bad = raw.decode("utf-8-sig"), raw.find(b"\0")
     except UnicodeDecodeError as error:
         bad = error.start
-    if bad >= 0:  # a zero, too: UTF-16 without a mark, or what was never written
+    if bad >= 0:  # a zero, too: UTF-16 without a mark, or unwritten data
         raise ForeignFileError(
-            path, "is no text", at=f"byte {bad}", due="text in UTF-8 is expected"
+            path, "is no text", at=f"byte {bad}", expected="text in UTF-8 is expected"
         )
     return found
 
@@ -117,19 +117,19 @@ def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
 
 
 class Row(NamedTuple):
-    """The cells of a line, which has this number in the file."""
+    """The cells of a line, with its number in the file."""
 
     line: int
     cells: list[str]
 
 
 def rows(path: Path) -> list[Row]:
-    """Lines of cells parted by blanks or commas; neither blank lines nor # comments."""
+    """Returns lines of cells separated by blanks or commas, without blank lines and # comments."""
     return rows_of(path, text(path))
 
 
 def rows_of(path: Path, whole: str) -> list[Row]:
-    """The same of the file's text."""
+    """Returns the same from the file's text."""
     lines = enumerate(whole.splitlines(), 1)
     bare = ((number, line.partition("#")[0].replace(",", " ").split()) for number, line in lines)
     found = [Row(number, cells) for number, cells in bare if cells]
@@ -139,7 +139,7 @@ def rows_of(path: Path, whole: str) -> list[Row]:
 
 
 class Written(NamedTuple):
-    """Rows of numbers, and what else their file shows: the columns' names, if any; commas."""
+    """Rows of numbers, with the columns' names, if any, and whether commas separate them."""
 
     rows: list[Row]
     names: list[str]
@@ -147,7 +147,7 @@ class Written(NamedTuple):
 
 
 def written(path: Path) -> Written:
-    """`rows`; a first row of words, or the comment before the numbers, names the columns."""
+    """Reads rows; a first row of words, or the comment before the numbers, names the columns."""
     whole = text(path)
     found = rows_of(path, whole)
     lines = whole.splitlines()
@@ -161,7 +161,7 @@ def written(path: Path) -> Written:
 
 
 class Sound(NamedTuple):
-    """The rows that can be used, their numbers, and what is to be said of the others."""
+    """The usable rows, their numbers, and remarks on the others."""
 
     rows: list[Row]
     numbers: Floats
@@ -171,16 +171,17 @@ class Sound(NamedTuple):
 def sound(
     path: Path, given: list[Row], columns: int | None = None, used: int | None = None
 ) -> Sound:
-    """`numbers` without the few rows that are cut off or have one that is not finite: of the first
-    `used` columns, or of all.
+    """Returns rows and numbers without the few rows that are cut off or not finite.
+
+    Numbers must be finite in the first `used` columns, or in all.
     """
-    due = columns or Counter(len(row.cells) for row in given).most_common(1)[0][0]
-    short = np.array([len(row.cells) for row in given]) != due
+    expected = columns or Counter(len(row.cells) for row in given).most_common(1)[0][0]
+    short = np.array([len(row.cells) for row in given]) != expected
     first = given[int(short.argmax())]
-    what = f"has {len(first.cells)} numbers; {due} a row are expected"
+    what = f"has {len(first.cells)} numbers; {expected} a row are expected"
     remarks = left_out(path, short, lambda k: f"line {given[k].line}", what)
     whole = _where(given, ~short)
-    found = _numbers(path, whole, due)
+    found = _numbers(path, whole, expected)
     bad = np.asarray(~np.isfinite(found[:, :used]).all(axis=1), np.bool_)
     remarks += left_out(path, bad, lambda k: f"line {whole[k].line}", NOT_FINITE)
     return Sound(_where(whole, ~bad), found[~bad], remarks)
@@ -193,7 +194,7 @@ def _where(given: list[Row], good: NDArray[np.bool_]) -> list[Row]:
 def left_out(
     path: Path, bad: NDArray[np.bool_], at: Callable[[int], str], what: str
 ) -> tuple[str, ...]:
-    """What to say of bad rows, none or one sentence; ForeignFileError where they are many."""
+    """Returns a remark on bad rows, if any; raises ForeignFileError where they are many."""
     count = int(bad.sum())
     if not count:
         return ()
@@ -204,7 +205,7 @@ def left_out(
 
 
 def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
-    """(rows, columns) finite numbers; as many columns as the first row has, if not said."""
+    """Returns (rows, columns) finite numbers; by default as many columns as the first row has."""
     out = _numbers(path, given, columns)
     bad = np.nonzero(~np.isfinite(out).all(axis=1))[0]
     if len(bad):
@@ -213,13 +214,13 @@ def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
 
 
 def _numbers(path: Path, given: list[Row], columns: int | None) -> Floats:
-    due = columns or len(given[0].cells)
-    out = np.empty((len(given), due))
+    expected = columns or len(given[0].cells)
+    out = np.empty((len(given), expected))
     for k, (line, cells) in enumerate(given):
         at = f"line {line}"
-        if len(cells) != due:
+        if len(cells) != expected:
             raise ForeignFileError(
-                path, f"has {len(cells)} numbers", at=at, due=f"{due} a row are expected"
+                path, f"has {len(cells)} numbers", at=at, expected=f"{expected} a row are expected"
             )
         if not all(map(is_number, cells)):
             raise ForeignFileError(path, "holds something that is no number", at=at)
@@ -231,7 +232,7 @@ def _numbers(path: Path, given: list[Row], columns: int | None) -> Floats:
 
 
 class Csv(NamedTuple):
-    """The columns' names, the rows below, and the number of the first of these in the file."""
+    """The columns' names, the rows below, and the first row's number in the file."""
 
     names: list[str]
     rows: list[list[str]]
@@ -239,7 +240,7 @@ class Csv(NamedTuple):
 
 
 def csv_rows(path: Path) -> Csv:
-    """The cells of every row that is not blank; the first row names the columns.
+    """Returns the cells of every row that is not blank; the first row names the columns.
 
     Rows that begin with # before the first one of data are comments. The last of them names the
     columns where no other row does: `#timestamp [ns],w_RS_S_x [rad s^-1]`, as EuRoC has it.
@@ -255,7 +256,9 @@ def csv_rows(path: Path) -> Csv:
         table.insert(0, comments[-1])
         skipped -= 1
     if not table:
-        raise ForeignFileError(path, "the file is empty", due="a row of column names is expected")
+        raise ForeignFileError(
+            path, "the file is empty", expected="a row of column names is expected"
+        )
     names, below = table[0], table[1:]
     by_semicolons = len(names) == 1 and ";" in names[0]
     _, more = _comments(below)
@@ -266,7 +269,7 @@ def csv_rows(path: Path) -> Csv:
                 path,
                 f"has {len(row)} cells, the first row names {len(names)}",
                 at=f"row {number}",
-                due="points in numbers, and commas between them, are expected"
+                expected="points in numbers, and commas between them, are expected"
                 if by_semicolons
                 else "",
             )
@@ -274,7 +277,7 @@ def csv_rows(path: Path) -> Csv:
 
 
 def _comments(table: list[list[str]]) -> tuple[list[list[str]], int]:
-    """The first rows if they are comments, without their #; and how many there are."""
+    """Returns the leading comment rows, without their #, and their number."""
     count = next(
         (k for k, row in enumerate(table) if not row[0].lstrip().startswith(COMMENT)), len(table)
     )
@@ -283,12 +286,12 @@ def _comments(table: list[list[str]]) -> tuple[list[list[str]], int]:
 
 
 def _may_name(comment: list[str], row: list[str]) -> bool:
-    """Whether the comment has a name for each cell of the row, which holds numbers itself."""
+    """Returns whether the comment has a name for each cell of a row of numbers."""
     return len(comment) == len(row) and any(is_number(cell) for cell in row)
 
 
 def is_number(cell: str) -> bool:
-    """As people write them: Python's own 1_763 is a slip of the hand, or a name."""
+    """Returns whether a cell is a number as people write them, unlike Python's 1_763."""
     try:
         float(cell)
     except ValueError:
@@ -300,12 +303,12 @@ def is_number(cell: str) -> bool:
 
 
 def json_object(path: Path) -> dict[str, Any]:
-    """An object with names: numbers that a double holds, strings that UTF-8 holds."""
+    """Reads a JSON object; its numbers must fit a double, its strings UTF-8."""
     return json_words(path, text(path, JSON_BYTES_MAX))
 
 
 def json_words(path: Path, words: str) -> dict[str, Any]:
-    """The same from words that stand in the file."""
+    """Parses the same from the file's text."""
     try:
         found = json.loads(
             words, parse_int=_integer, parse_float=_real, object_pairs_hook=_named_once
@@ -315,13 +318,13 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
         raise ForeignFileError(
             path,
             "is nested too deep",
-            due="an object with numbers, words and lists of them is expected",
+            expected="an object with numbers, words and lists of them is expected",
         ) from None
     except UnicodeEncodeError:
         raise ForeignFileError(
             path,
             "holds half of a surrogate pair (\\ud800 to \\udfff)",
-            due="whole characters are expected",
+            expected="whole characters are expected",
         ) from None
     except json.JSONDecodeError as error:
         raise ForeignFileError(
@@ -331,7 +334,7 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
         raise ForeignFileError(path, str(error)) from None
     if not isinstance(found, dict):
         raise ForeignFileError(
-            path, "is JSON without names", due="an object with names is expected"
+            path, "is JSON without names", expected="an object with names is expected"
         )
     return found
 
@@ -362,13 +365,13 @@ def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 # --- YAML -----------------------------------------------------------------------------------------
 
-OPENCV_DIRECTIVE = "%YAML:1.0"  # no YAML: the colon is OpenCV's own
+OPENCV_DIRECTIVE = "%YAML:1.0"  # invalid YAML: the colon is OpenCV's own
 LACKS_BLANK = re.compile(r"^(\s*[A-Za-z_][\w.]*:)(?=[^\s:/])", re.MULTILINE)
 OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
 
 
 class _Constructor(SafeConstructor):
-    """OpenCV's matrices are objects with the names rows, cols, dt and data."""
+    """Reads OpenCV's matrices as objects with the names rows, cols, dt and data."""
 
 
 _Constructor.add_constructor(
@@ -377,17 +380,15 @@ _Constructor.add_constructor(
 
 
 def yaml_object(path: Path) -> dict[str, Any]:
-    """An object with names: of Kalibr, of OpenCV, of a data set's sensor.yaml. YAML 1.2: 1e-3 is a
-    number.
-    """
+    """Reads an object in YAML 1.2, where 1e-3 is a number: Kalibr's, OpenCV's, a data set's."""
     return yaml_words(path, text(path, YAML_BYTES_MAX))
 
 
 def yaml_words(path: Path, words: str) -> dict[str, Any]:
-    """The same from words that stand in the file."""
+    """Parses the same from the file's text."""
     if len(words) > YAML_BYTES_MAX:
         raise ForeignFileError(
-            path, "is too long", due=f"at most {YAML_BYTES_MAX} bytes are expected"
+            path, "is too long", expected=f"at most {YAML_BYTES_MAX} bytes are expected"
         )
     _require_shallow(path, words)
     yaml = YAML(typ="safe", pure=True)
@@ -403,25 +404,27 @@ def yaml_words(path: Path, words: str) -> dict[str, Any]:
     except (YAMLError, RecursionError, ValueError) as error:
         raise ForeignFileError(path, f"is no YAML: {_first_line(error)}") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
-        raise ForeignFileError(path, "is YAML without names", due="names with values are expected")
+        raise ForeignFileError(
+            path, "is YAML without names", expected="names with values are expected"
+        )
     return found
 
 
 def _as_yaml(words: str) -> str:
-    """OpenCV's reader asks for no blank behind a name's colon, and people leave it out."""
+    """Adds the blank after a name's colon, which OpenCV's reader does not need and people omit."""
     if not words.startswith(OPENCV_DIRECTIVE):
         return words
     return LACKS_BLANK.sub(r"\1 ", words.removeprefix(OPENCV_DIRECTIVE))
 
 
 def _require_shallow(path: Path, words: str) -> None:
-    """Its reader takes minutes over thousands of brackets within each other."""
+    """Refuses deep nesting: the parser takes minutes over thousands of nested brackets."""
     deepest = max(accumulate((c in "[{") - (c in "]}") for c in words), default=0)
     if deepest > YAML_DEPTH_MAX:
         raise ForeignFileError(
             path,
             "is nested too deep",
-            due="names with numbers, words and lists of them are expected",
+            expected="names with numbers, words and lists of them are expected",
         )
 
 
@@ -429,13 +432,13 @@ def _require_shallow(path: Path, words: str) -> None:
 
 
 def npz(path: Path) -> ArraysByName:
-    """All arrays of a .npz file; pickled objects are refused."""
+    """Reads all arrays of a .npz file; refuses pickled objects."""
     _require_file(path)
-    due = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
+    expected = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
     if beginning(path).startswith(NPY_MAGIC):
-        raise ForeignFileError(path, "is a lone array (.npy)", due=due)
+        raise ForeignFileError(path, "is a lone array (.npy)", expected=expected)
     if not zipfile.is_zipfile(path):
-        raise ForeignFileError(path, "is no .npz file, or its end is missing", due=due)
+        raise ForeignFileError(path, "is no .npz file, or its end is missing", expected=expected)
     try:
         _require_unpackable(path)
         with np.load(path, allow_pickle=False) as file:
@@ -452,18 +455,18 @@ def _require_unpackable(path: Path) -> None:
     locked = [member.filename for member in members if member.flag_bits & 1]
     if locked:
         raise ForeignFileError(
-            path, "is encrypted", at=locked[0], due="a zip without a password is expected"
+            path, "is encrypted", at=locked[0], expected="a zip without a password is expected"
         )
     _require_size(path, sum(member.file_size for member in members))
 
 
 def mat(path: Path) -> ArraysByName:
-    """All variables of a MATLAB file of version 5 to 7."""
+    """Reads all variables of a MATLAB file of version 5 to 7."""
     _require_file(path)
     packed = content(path, ARRAYS_BYTES_MAX)
     if matfile.is_hdf5(packed):
         raise ForeignFileError(
-            path, "is a MATLAB 7.3 file (HDF5)", due="save it with -v7 to convert it"
+            path, "is a MATLAB 7.3 file (HDF5)", expected="save it with -v7 to convert it"
         )
     try:
         return matfile.arrays(packed, ARRAYS_BYTES_MAX)
@@ -473,7 +476,7 @@ def mat(path: Path) -> ArraysByName:
 
 def _require_file(path: Path) -> None:
     if path.is_dir():
-        raise ForeignFileError(path, "is a folder", due="one file of it is expected")
+        raise ForeignFileError(path, "is a folder", expected="one file of it is expected")
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
     size = path.stat().st_size
@@ -487,7 +490,7 @@ def _require_size(path: Path, size: int) -> None:
         raise ForeignFileError(
             path,
             f"holds {size} bytes of arrays",
-            due=f"at most {ARRAYS_BYTES_MAX} are expected: cut the drive into pieces",
+            expected=f"at most {ARRAYS_BYTES_MAX} are expected: cut the drive into pieces",
         )
 
 

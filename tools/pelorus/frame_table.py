@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a filter made of each stereo frame, by column, and as CSV."""
+"""The filter's results for each stereo frame, by column, and as CSV."""
 
 from __future__ import annotations
 
@@ -37,27 +37,27 @@ DIAGONAL = [i * (i + 3) // 2 for i in range(6)]  # of a packed 6 x 6
 
 @dataclass(frozen=True)
 class FrameTable:
-    """A row a frame, refused ones too: NaN where there is no estimate, or no covariance."""
+    """A row for each frame, refused ones too: NaN where there is no estimate, or no covariance."""
 
     t_ns: Times
     columns: dict[str, Floats]
-    by_imu: bool = False  # bias_v* are then the accelerometer's, and called bias_a* in a file
+    by_imu: bool = False  # bias_v* are then the accelerometer's, named bias_a* in a file
 
     def __getitem__(self, name: str) -> Floats:
         return self.columns[name]
 
     def stack(self, *names: str) -> Floats:
-        """(rows, len(names))."""
+        """Returns the named columns (rows, len(names))."""
         return np.stack([self.columns[name] for name in names], axis=-1)
 
     @property
     def reasons(self) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Bits of `plr_reason`."""
+        """Returns the bits of `plr_reason`."""
         return self.columns["reasons"].astype(np.int64)
 
 
 def frame_table(messages: Sequence[Message]) -> FrameTable:
-    """From the messages of a result."""
+    """Makes the table from the messages of a result."""
     rows = list(_answers(messages))
     if not rows:
         raise PelorusError("the result holds no answer to a stereo frame")
@@ -74,7 +74,7 @@ def frame_table(messages: Sequence[Message]) -> FrameTable:
 
 
 def _answers(messages: Sequence[Message]) -> Iterator[tuple[Pose | None, Report]]:
-    """A frame is followed by its pose, if it was not refused, and its report."""
+    """Yields each frame's pose, None if it was refused, and its report."""
     pose: Pose | None = None
     for message in messages:
         if isinstance(message, Stereo):
@@ -103,8 +103,8 @@ def _estimate(pose: Pose) -> Floats:
 
 
 def write_csv(path: Path, table: FrameTable) -> None:
-    """Times to the nanosecond; what is not known is empty."""
-    names = {"created": "new"}  # of columns, where another word is the usual one
+    """Writes CSV with times to the nanosecond; unknown values are empty."""
+    names = {"created": "new"}  # columns with another usual name
     if table.by_imu:
         names |= {name: name.replace("bias_v", "bias_a") for name in table.columns}
         names["created"] = "new"

@@ -29,7 +29,7 @@ from pelorus.message import (
     TwistTiming,
 )
 
-# Of pelorus.message, for those who use the dataclasses below.
+# From pelorus.message, for users of the dataclasses below.
 __all__ = [
     "BodyAxes",
     "Kind",
@@ -59,14 +59,14 @@ class StartFlag(IntFlag):
 
 
 class TruthKnows(IntFlag):
-    """What a TRUTH gives besides the pose."""
+    """Flags of the fields that a TRUTH has besides the pose."""
 
     VELOCITY = 1
     BIAS = 2
 
 
 def header_name(words: str) -> str:
-    """The words as a HEADER can hold them: whole characters of UTF-8, and not too many.
+    """Returns the words as a HEADER can hold them: whole characters of UTF-8, and not too many.
 
     A file's name may hold bytes that are no text; they become question marks.
     """
@@ -75,17 +75,17 @@ def header_name(words: str) -> str:
 
 
 def zeros(*shape: int) -> Any:
-    """A dataclass field: zeros of the given shape by default."""
+    """Declares a dataclass field of zeros of the given shape."""
     return field(default_factory=lambda: np.zeros(shape))
 
 
 def unknown(*shape: int) -> Any:
-    """A dataclass field: -1 everywhere by default, for variances that are not known."""
+    """Declares a dataclass field of -1, for unknown variances."""
     return field(default_factory=lambda: np.full(shape, -1.0))
 
 
 def identity() -> Any:
-    """A dataclass field: the rotation that does nothing by default."""
+    """Declares a dataclass field with the identity rotation."""
     return field(default_factory=lambda: np.eye(3))
 
 
@@ -105,7 +105,7 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What the recorder suggests; negative: nothing."""
+    """The noises that a recorder suggests; negative: none."""
 
     pixel_sigma_px: float = -1.0
     velocity_sigma_mps: float = -1.0
@@ -215,7 +215,7 @@ class Imu(Message, kind=Kind.IMU):
 
     @property
     def times_ns(self) -> list[int]:
-        """When each reading was taken."""
+        """Returns the time of each reading."""
         return [self.t_ns + k * self.period_ns for k in range(len(self.a_B_mps2))]
 
     def values(self) -> dict[str, Any]:
@@ -268,7 +268,7 @@ class Stereo(Message, kind=Kind.STEREO):
         return cls(values["t_ns"], ids, pixels, values["budget"])
 
 
-# The row's numbers behind the id as one array.
+# The numbers of a row after the id, as one array.
 _STEREO_ROW = np.dtype(
     [("id", OBSERVATION["id"]), ("pixels", "<f4", (len(OBSERVATION.names or ()) - 1,))]
 )
@@ -286,9 +286,10 @@ def rows_of(payload: bytes, at: int, row: np.dtype[Any], count: int) -> NDArray[
 
 @dataclass(frozen=True, eq=False)
 class Truth(Message, kind=Kind.TRUTH):
-    """A reference pose, body to world, and what `knows` says is known besides.
+    """A reference pose, body to world, and what else is known by the flags in `knows`.
 
-    That is the velocity along the body's axes, and the biases of the readings, in START's order.
+    That may be the velocity along the body's axes, and the biases of the readings, in START's
+    order.
     """
 
     t_ns: int
@@ -325,8 +326,8 @@ class Text(Message, kind=Kind.TEXT):
 class End(Message, kind=Kind.END):
     """How many frames there were; `frames` counts all before this one.
 
-    Bits of `differs` say of which kinds (COUNTED) another number arrived than the END says that
-    this one answers, and `arrived` how many; the others are 0.
+    Bits of `differs` are the kinds (COUNTED) of which another number arrived than the answered END
+    says, and `arrived` has these numbers; the others are 0.
     """
 
     twists: int
@@ -347,14 +348,14 @@ class End(Message, kind=Kind.END):
 
     @property
     def incomplete(self) -> dict[Kind, int]:
-        """How many arrived, of the kinds of which that is another number than was sent."""
+        """Returns the numbers that arrived, of the kinds where these differ from those sent."""
         counts = zip(self.COUNTED, (*self.arrived, self.imus_arrived), strict=True)
         return {kind: count for at, (kind, count) in enumerate(counts) if self.differs >> at & 1}
 
 
 @dataclass(frozen=True, eq=False)
 class State(Message, kind=Kind.STATE):
-    """Keep the filter's state, or bring it back at `t_ns`.
+    """A request to save the filter's state, or to restore it at `t_ns`.
 
     `moved_variance` is how far the body may have moved meanwhile: variances of (rho, theta).
     """
@@ -371,7 +372,7 @@ class State(Message, kind=Kind.STATE):
 
 @dataclass(frozen=True, eq=False)
 class Config(Message, kind=Kind.CONFIG):
-    """Settings by id (see `pelorus.settings`), and of which build they are in force."""
+    """Settings by id (see `pelorus.settings`), and the build in which they are in force."""
 
     settings: dict[int, float] = field(default_factory=dict)
     build_fingerprint: int = 0
@@ -408,7 +409,7 @@ class Landmark(Message, kind=Kind.LANDMARK):
 
 @dataclass(frozen=True, eq=False)
 class Pose(Message, kind=Kind.POSE):
-    """What the filter knew after a message; reals have `real_bytes` bytes, the position eight."""
+    """The filter's estimate after a message; reals have `real_bytes` bytes, the position eight."""
 
     t_ns: int
     p_WB_m: Floats = zeros(3)
@@ -428,7 +429,7 @@ class Pose(Message, kind=Kind.POSE):
 
     @property
     def knows_covariance(self) -> bool:
-        """False once the filter has diverged."""
+        """Returns False once the filter has diverged."""
         return bool(self.covariance[0] < UNKNOWN_VARIANCE)
 
 
@@ -460,7 +461,7 @@ class Report(Message, kind=Kind.REPORT):
     update_us: int = 0
     notice: int = Notice.NONE  # Notice, or one of a later version
     innovation_rows: int = 0
-    innovation_d2: float = -1.0  # with no rows: not known
+    innovation_d2: float = -1.0  # unknown if there are no rows
     innovation_log_det: float = -1.0
 
     composed: ClassVar = ("reasons",)

@@ -19,7 +19,7 @@ from pelorus import schema
 from pelorus.frames import Kind, Message, Report
 
 GOOD, LOST = 0, 2
-PAUSE_NS = 1_000_000_000  # after so long the filter itself says NO_FRAMES
+PAUSE_NS = 1_000_000_000  # after which the filter itself reports NO_FRAMES
 NO_FRAMES = "no frames came"
 
 SHORT = {
@@ -47,18 +47,20 @@ SHORT = {
     "RELOCATED": "the pose was found anew from known landmarks",
     "MAP_DISAGREES": "known landmarks and the pose disagree",
 }
-# What follows from a cause; where the cause is known too, it is told first.
+# Symptoms, which come after their causes where these are known, too.
 SYMPTOMS = tuple(
     SHORT[name] for name in ("POSE_MAY_BE_WRONG", "FEW_OBSERVATIONS", "NO_OBSERVATIONS")
 )
 NOT_STARTED = schema.number("reason", "NOT_STARTED")
-HARMLESS = schema.LIMITS["harmless_reasons"]  # they leave the estimate as good as it should be
+HARMLESS = schema.LIMITS["harmless_reasons"]  # they do not affect the estimate's quality
 
 
 @dataclass(frozen=True)
 class Spell:
-    """From the first frame that is not good to the last; `why`: causes before symptoms, of each the
-    most frequent first; `counts`: in how many of the frames each of them held.
+    """A spell from the first frame that is not good to the last.
+
+    `why` has causes before symptoms, each by frequency; `counts` is the number of frames for each
+    of them.
     """
 
     health: int
@@ -69,7 +71,7 @@ class Spell:
     counts: tuple[int, ...] = ()
 
     def words(self, origin_ns: int) -> str:
-        """`lost from 37.0 to 40.1 s (31 frames): identical pixels`."""
+        """Returns `lost from 37.0 to 40.1 s (31 frames): identical pixels`."""
         start, end = (f"{(t - origin_ns) * 1e-9:.1f}" for t in (self.from_ns, self.to_ns))
         when = f"at {start} s" if start == end else f"from {start} to {end} s"
         frames = f" ({self.frames} frame{'s' if self.frames > 1 else ''})" if self.frames else ""
@@ -77,7 +79,7 @@ class Spell:
 
     @property
     def reasons(self) -> str:
-        """`identical pixels, no point used for long (2 of them)`."""
+        """Returns `identical pixels, no point used for long (2 of them)`."""
         counts = self.counts or (self.frames,) * len(self.why)
         some = (f" ({count} of them)" if count < self.frames else "" for count in counts)
         return ", ".join(map("".join, zip(self.why, some, strict=True)))
@@ -85,15 +87,15 @@ class Spell:
 
 @dataclass(frozen=True)
 class TimeLine:
-    """All spells in the order of time, and how many frames had which health, since the start."""
+    """All spells in the order of time, and the number of frames by health, since the start."""
 
     frames: int
     by_health: dict[str, int]
     spells: tuple[Spell, ...]
-    before_start: int = 0  # frames that are not counted
+    before_start: int = 0  # frames that are not in the counts
 
     def summary(self) -> str:
-        """`good in 380 of 410 frames, lost in 30`."""
+        """Returns `good in 380 of 410 frames, lost in 30`."""
         good = self.by_health.get(schema.HEALTHS[GOOD], 0)
         others = [
             f"{name} in {count}"
@@ -104,13 +106,13 @@ class TimeLine:
         start = f", after {waited} frames before the start" if waited else ""
         return ", ".join((f"good in {good} of {self.frames} frames", *others)) + start
 
-    def told(self, origin_ns: int) -> list[str]:
-        """The summary, and each spell."""
+    def lines(self, origin_ns: int) -> list[str]:
+        """Returns the summary, and each spell."""
         return [self.summary(), *(spell.words(origin_ns) for spell in self.spells)]
 
 
 def time_line(messages: Iterable[Message]) -> TimeLine | None:
-    """Of a filter's result; None where there is no answer to a frame."""
+    """Returns the time line of a filter's result; None where there is no answer to a frame."""
     answers = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STEREO]
     if not answers:
         return None
@@ -119,14 +121,14 @@ def time_line(messages: Iterable[Message]) -> TimeLine | None:
     counts = Counter(answer.health for answer in answers)
     by_health = {words: counts[number] for number, words in schema.HEALTHS.items()}
     told = answers[1:] if _why(answers[0]) == (SHORT["FEW_OBSERVATIONS"],) else answers
-    spells = sorted(  # the first frame makes landmarks, and has none to use yet
+    spells = sorted(  # the first frame makes landmarks, and uses none yet
         (*_of_frames(told), *_pauses(answers)), key=lambda spell: (spell.from_ns, spell.to_ns)
     )
     return TimeLine(len(answers), by_health, tuple(spells), waited)
 
 
 def reasons(bits: int) -> tuple[str, ...]:
-    """What a mask says, in words, without what is harmless; one of a later version by number."""
+    """Returns the reasons in a mask, in words, without harmless ones; unknown ones by number."""
     found = []
     for k in range(bits.bit_length()):
         if bits & ~HARMLESS & 1 << k:
@@ -138,13 +140,13 @@ def reasons(bits: int) -> tuple[str, ...]:
 def _why(answer: Report) -> tuple[str, ...]:
     if answer.status == 0:
         return reasons(answer.reasons)
-    # its reasons are those of the frame before
+    # it has the reasons of the frame before
     words = schema.STATUSES.get(answer.status, f"status {answer.status}")
     return (f"frame refused, {words.partition(':')[0].partition(';')[0]}",)
 
 
 def _of_frames(answers: Sequence[Report]) -> Iterator[Spell]:
-    """Each health by itself, so that a moment of LOST does not hide in a long DEGRADED."""
+    """Yields spells by health, so that a moment of LOST shows in a long DEGRADED."""
     for health in sorted(set(schema.HEALTHS) - {GOOD}):
         why: Counter[str] = Counter()
         open_: Spell | None = None

@@ -24,12 +24,12 @@ from pelorus.motion import Times
 
 GRAVITY_MPS2 = 9.81
 SERIES_TERMS = 6  # exact to rounding for up to 0.3 rad a step
-STAMP_TOLERANCE_NS = 100  # a batch has one period: its stamps may be off by so much
-PERIOD_MAX_NS = 2**32 - 1  # of a batch, an u32; readings beyond a longer pause begin a new one
+STAMP_TOLERANCE_NS = 100  # a batch has one period: error of its stamps
+PERIOD_MAX_NS = 2**32 - 1  # of a batch, a u32; a longer pause begins a new one
 
 
 class Inertial(NamedTuple):
-    """What an IMU reads at n times."""
+    """Readings of an IMU at n times."""
 
     t_ns: Times
     a_B_mps2: Floats  # (n, 3)
@@ -39,8 +39,8 @@ class Inertial(NamedTuple):
         return Inertial(self.t_ns[index], self.a_B_mps2[index], self.w_B_radps[index])
 
     def between(self, t_ns: Times) -> Inertial:
-        """By linear interpolation at any times; beyond the ends the first and last reading hold."""
-        # times from the beginning: a double has no nanoseconds of today's clock
+        """Interpolates linearly at any times; beyond the ends the first and last reading hold."""
+        # relative times: a double cannot hold nanoseconds of today's clock
         own, at = self.t_ns - self.t_ns[:1], t_ns - self.t_ns[:1]
         columns = np.hstack((self.a_B_mps2, self.w_B_radps)).T
         found = np.stack([np.interp(at, own, x) for x in columns], axis=-1)
@@ -50,16 +50,16 @@ class Inertial(NamedTuple):
 NO_READINGS = Inertial(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)))
 
 
-class Moving(NamedTuple):
-    """Where bodies are and how they move: R (..., 3, 3), p in the world, v in body axes."""
+class MotionState(NamedTuple):
+    """Poses and velocities of bodies: R (..., 3, 3), p in the world, v in body axes."""
 
     R: Floats
     p: Floats
     v_B: Floats
 
 
-def step(state: Moving, tau_s: Floats, a: Floats, w: Floats, g_W: Floats) -> Moving:
-    """Every state (...) after its own tau, with a and w constant meanwhile."""
+def step(state: MotionState, tau_s: Floats, a: Floats, w: Floats, g_W: Floats) -> MotionState:
+    """Moves every state (...) by its own tau, with constant a and w."""
     tau = tau_s[..., None]
     turn = tau * w
     W = se3.skew(turn)
@@ -72,7 +72,7 @@ def step(state: Moving, tau_s: Floats, a: Floats, w: Floats, g_W: Floats) -> Mov
     down = _times(np.swapaxes(state.R, -1, -2), g_W)
     moved = tau * state.v_B + tau * tau * (0.5 * down + _times(G2, a))
     v_B = _times(np.swapaxes(E, -1, -2), state.v_B + tau * (down + _times(G1, a)))
-    return Moving(state.R @ E, state.p + _times(state.R, moved), v_B)
+    return MotionState(state.R @ E, state.p + _times(state.R, moved), v_B)
 
 
 def _times(M: Floats, x: Floats) -> Floats:
@@ -80,7 +80,7 @@ def _times(M: Floats, x: Floats) -> Floats:
 
 
 def series(s: Floats, order: int, terms: int) -> Floats:
-    """sum_k (-s)^k / (2k + order)!, s = a^2.
+    """Returns sum_k (-s)^k / (2k + order)!, s = a^2.
 
     That is sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for order 1, 2 and 3.
     """
@@ -92,9 +92,9 @@ def series(s: Floats, order: int, terms: int) -> Floats:
 
 
 def coasted(
-    readings: Inertial, from_ns: Times, until_ns: Times, first: Moving, gravity: float
-) -> Moving:
-    """Many stretches side by side: from `first` (n) at `from_ns` (n) to `until_ns`.
+    readings: Inertial, from_ns: Times, until_ns: Times, first: MotionState, gravity: float
+) -> MotionState:
+    """Moves many states in parallel: from `first` (n) at `from_ns` (n) to `until_ns`.
 
     Each interval has the mean of the readings at both ends; where a stretch cuts one, they are
     interpolated.
@@ -115,8 +115,8 @@ def coasted(
     return state
 
 
-def path(readings: Inertial, first: Moving, gravity: float) -> Moving:
-    """The states (n) at the times of the readings, of which `first` is the first."""
+def path(readings: Inertial, first: MotionState, gravity: float) -> MotionState:
+    """Returns the states (n) at the times of the readings, beginning with `first`."""
     g_W = np.array([0.0, 0.0, -gravity])
     tau: Floats = np.diff(readings.t_ns) * 1e-9
     a = 0.5 * (readings.a_B_mps2[:-1] + readings.a_B_mps2[1:])
@@ -124,17 +124,17 @@ def path(readings: Inertial, first: Moving, gravity: float) -> Moving:
     states = [first]
     for k in range(len(tau)):
         states.append(step(states[-1], tau[k], a[k], w[k], g_W))
-    return Moving(*(np.array(part) for part in zip(*states, strict=True)))
+    return MotionState(*(np.array(part) for part in zip(*states, strict=True)))
 
 
 def messages(
     readings: Inertial, cuts_ns: Times, most: int = IMU_READINGS_MAX
 ) -> Iterator[tuple[int, Imu]]:
-    """As IMU frames of up to `most` readings, each with the time of its last one.
+    """Yields IMU frames of up to `most` readings, each with the time of its last one.
 
-    No batch has readings on both sides of a cut, and in none a stamp is off by more than
+    No batch has readings on both sides of a cut, and none has a stamp that is off by more than
     STAMP_TOLERANCE_NS. Cuts are the times, in order, of all that the filter takes besides: frames
-    and readings of small sensors. A batch that reaches beyond one makes it late.
+    and readings of small sensors. A batch across one would make it late.
     """
     side = np.searchsorted(cuts_ns, readings.t_ns, side="left")
     begin, count = 0, len(readings.t_ns)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What a filter with an IMU knew of its states, one by one, where TRUTH says them.
+"""Compares each state of a filter with an IMU with the truth, where TRUTH has it.
 
 Each NEES is a mean over frames and degrees of freedom, of e^T P^-1 e with the state's own block of
-P; of the biases, whose variances alone stand in a POSE, of e^2 / variance: 1 is expected for all.
+P; for the biases, which have only variances in a POSE, of e^2 / variance. 1 is expected for all.
 """
 
 from __future__ import annotations
@@ -30,11 +30,14 @@ MEANING = {
 def figures(
     messages: Sequence[Message], truths: Sequence[Message], t_ns: Times, error: Floats, P: Floats
 ) -> Figures:
-    """Of a result; `truths` hold the TRUTH; error and P are those of the poses at t_ns (n, 6)."""
+    """Returns the figures of a result.
+
+    `truths` contain the TRUTH; error and P are those of the poses at t_ns (n, 6).
+    """
     poses = {m.t_ns: m for m in messages if isinstance(m, Pose) and m.after_stereo}
     found: Figures = dict.fromkeys(MEANING)
     found["counted_from_s"] = (int(t_ns[0]) - min(poses)) * 1e-9
-    later = slice(1, None)  # at the first one position and heading have no error by the alignment
+    later = slice(1, None)  # the alignment makes the first error zero
     error, P = error[later], P[later]
     found["nees_position"] = mean(nees_per_dof(error[:, :3], P[:, :3, :3]))
     found["nees_rotation"] = mean(nees_per_dof(error[:, 3:], P[:, 3:, 3:]))

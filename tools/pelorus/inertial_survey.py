@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What can be told of an IMU from its readings alone: ranges, faults, and its noise where it stood.
+"""Examines an IMU by its readings alone: ranges, faults, and its noise at rest.
 
-The readings of a body that stands still are its biases, gravity and noise: that is the evidence for
-the noises in a config, and a data sheet is none.
+The readings of a body at rest are its biases, gravity and noise. They are the evidence for the
+noises in a config; a data sheet is none.
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ from pelorus.frames import Imu
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 
-WINDOW_S = 0.5  # of such pieces a stretch at rest is made
-STILL_S = 2.0  # a shorter one is none: an even motion looks like rest for a moment
-MEAN_S = 0.1  # the noise is that of means of so long, which a filter in the sensor leaves alone
+WINDOW_S = 0.5  # length of the windows that make a stretch at rest
+STILL_S = 2.0  # the least stretch: an even motion looks like rest for a moment
+# the noise is that of means of this length, which a filter in the sensor does not affect
+MEAN_S = 0.1
 WINDOW_LEAST = 10  # readings of a window
 # What a body at rest may show besides white noise (an engine), and how its mean may wander.
 SPREAD, WANDER = np.array([0.5, 0.05]), np.array([0.1, 0.01])  # m/s^2 and rad/s
-WHITE_SHARE = 2.0  # the spread may be that of successive readings so many times
+WHITE_SHARE = 2.0  # ratio of the spread to that of successive readings
 MEAN_SIGMAS = 4.0
 
 
 @dataclass(frozen=True)
 class Still:
-    """The longest stretch in which the body stood, as far as an IMU can tell."""
+    """The longest stretch at rest, as far as an IMU shows it."""
 
     from_ns: int
     to_ns: int
@@ -42,7 +43,7 @@ class Still:
 
 @dataclass(frozen=True)
 class ImuSurvey:
-    """The readings of all IMU frames."""
+    """The ranges and faults of all IMU frames."""
 
     readings: int
     accel_range: tuple[tuple[float, float], ...]  # least and most of x, y, z, m/s^2
@@ -53,7 +54,7 @@ class ImuSurvey:
 
 
 def readings_of(messages: Sequence[Imu]) -> Inertial:
-    """All readings in the order of the file."""
+    """Returns all readings in the order of the file."""
     return Inertial(
         np.array([t for m in messages for t in m.times_ns], np.int64),
         np.concatenate([m.a_B_mps2 for m in messages]),
@@ -62,7 +63,7 @@ def readings_of(messages: Sequence[Imu]) -> Inertial:
 
 
 def survey(readings: Inertial) -> ImuSurvey:
-    """Of at least one reading."""
+    """Examines readings, of which there must be one at least."""
     numbers = np.hstack(readings[1:])
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(numbers).all(axis=1))
     sound = readings.at(finite)
@@ -83,13 +84,13 @@ def _ranges(numbers: Floats) -> tuple[tuple[float, float], ...]:
 
 
 def longest_run(flags: NDArray[np.bool_]) -> int:
-    """How many in succession are True."""
+    """Returns the length of the longest run of True."""
     begin, end = _longest(flags)
     return end - begin
 
 
 def _longest(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    """Where the longest run of True begins and ends; (0, 0) if there is none."""
+    """Returns begin and end of the longest run of True; (0, 0) if there is none."""
     edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
     begins, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
     if not len(begins):
@@ -99,7 +100,7 @@ def _longest(flags: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def _still(readings: Inertial) -> Still | None:
-    """None where time goes back, or nothing stands for STILL_S."""
+    """Returns the longest rest; None where time goes back, or nothing rests for STILL_S."""
     if len(readings.t_ns) < WINDOW_LEAST or (np.diff(readings.t_ns) <= 0).any():
         return None
     t_s = (readings.t_ns - readings.t_ns[0]) * 1e-9
@@ -107,7 +108,7 @@ def _still(readings: Inertial) -> Still | None:
     bounds = np.searchsorted(window, np.arange(window[-1] + 2))
     calm = np.array([_calm(readings, slice(*ends)) for ends in pairwise(bounds)])
     begin, end = _longest(_joined(readings, bounds, calm))
-    begin = max(begin - 1, 0)  # which the first one is joined to
+    begin = max(begin - 1, 0)  # the window to which the first one is joined
     if (end - begin) * WINDOW_S < STILL_S:
         return None
     return _found(readings.at(slice(int(bounds[begin]), int(bounds[end]))))
@@ -118,7 +119,7 @@ def _parts(readings: Inertial) -> tuple[Floats, Floats]:
 
 
 def _calm(readings: Inertial, rows: slice) -> bool:
-    """Whether the readings of a window spread no more than their noise, or an engine."""
+    """Returns whether the readings of a window spread no more than by noise, or an engine."""
     if rows.stop - rows.start < WINDOW_LEAST:
         return False
     for part, allowed in zip(_parts(readings.at(rows)), SPREAD, strict=True):
@@ -131,7 +132,7 @@ def _calm(readings: Inertial, rows: slice) -> bool:
 def _joined(
     readings: Inertial, bounds: NDArray[np.intp], calm: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether the mean of a window is that of the one before."""
+    """Returns whether each window has the mean of the one before."""
     joined = np.zeros(len(calm), bool)
     for k in range(1, len(calm)):
         if not (calm[k] and calm[k - 1]):
@@ -158,8 +159,10 @@ def _found(stretch: Inertial) -> Still:
 
 
 def scatter(readings: Inertial) -> tuple[float, float]:
-    """Returns the densities of gyro and accelerometer by which readings scatter about the line
-    through their neighbours: the least that the filter takes for noise (docs/MATH.md 19).
+    """Returns the densities of gyro and accelerometer by the scatter about lines through
+    neighbours.
+
+    They are the least noise that the filter assumes (docs/MATH.md 19).
     """
     usual_s = float(np.median(np.diff(readings.t_ns))) * 1e-9
     accel, gyro = (
@@ -170,7 +173,7 @@ def scatter(readings: Inertial) -> tuple[float, float]:
 
 
 def _density(stretch: Inertial, numbers: Floats) -> float:
-    """From means of MEAN_S: neighbours differ by density sqrt(2 / MEAN_S)."""
+    """Returns a noise density by means of MEAN_S, which differ by density sqrt(2 / MEAN_S)."""
     piece = ((stretch.t_ns - stretch.t_ns[0]) * 1e-9 / MEAN_S).astype(np.int64)
     count = np.bincount(piece)
     whole = count >= 0.5 * np.median(count)

@@ -22,24 +22,24 @@ FLOATS = ("f32", "f64", "real")
 
 
 class MalformedPayload(ValueError):
-    """A payload that is shorter than its kind says, or whose counts do not fit it."""
+    """A payload that is shorter than its kind needs, or whose counts do not fit it."""
 
 
 def need(payload: bytes, size: int) -> None:
-    """Refuse a payload shorter than `size` bytes."""
+    """Refuses a payload shorter than `size` bytes."""
     if len(payload) < size:
         raise MalformedPayload(f"payload of {len(payload)} bytes, at least {size} are expected")
 
 
 def within(name: str, value: int, least: int, most: int) -> int:
-    """The value itself, unless the format does not list it."""
+    """Returns the value; raises MalformedPayload if the format does not allow it."""
     if not least <= value <= most:
         raise MalformedPayload(f"{name} is {value}, {least} to {most} are defined")
     return value
 
 
 class _Run:
-    """Fields of one version that lie one behind the other, without a text among them."""
+    """Successive fields of one version, without a text among them."""
 
     def __init__(self, fields: list[Field]) -> None:
         self.fields = fields
@@ -79,7 +79,7 @@ class _Run:
                 yield from value
 
     def unpack(self, payload: bytes, at: int, values: dict[str, Any]) -> int:
-        """Adds to the values; where the fields end."""
+        """Adds the fields to the values; returns where they end."""
         numbers = self._struct_for(values)
         need(payload, at + numbers.size)
         found = numbers.unpack_from(payload, at)
@@ -99,8 +99,9 @@ class _Run:
 
 
 class Layout:
-    """The bytes of a payload, by its table in `pelorus.schema`. Arrays become float64, and nine
-    numbers a 3x3 matrix.
+    """The bytes of a payload, by its table in `pelorus.schema`.
+
+    Arrays become float64, and nine numbers a 3x3 matrix.
     """
 
     def __init__(self, table: MessageTable) -> None:
@@ -108,7 +109,7 @@ class Layout:
         self._runs = [_Run(list(run)) for _, run in groupby(table.fields, _run_of)]
 
     def pack(self, values: Mapping[str, Any]) -> bytes:
-        """Raises ValueError where a value is none of its field."""
+        """Returns the bytes; raises ValueError where a value does not fit its field."""
         texts = {
             run.fields[0].name: self._text(run.fields[0], values)
             for run in self._runs
@@ -128,8 +129,10 @@ class Layout:
         return stored
 
     def unpack(self, payload: bytes) -> tuple[dict[str, Any], int]:
-        """Values by name, and where they end; MalformedPayload if there are not so many bytes, or a
-        value is not allowed. Fields that a later version added may be missing, in both.
+        """Returns values by name, and where they end.
+
+        Raises MalformedPayload if there are too few bytes, or a value is not allowed. Fields that a
+        later version added may be missing, in both.
         """
         values: dict[str, Any] = {}
         at, since = 0, 0
@@ -150,7 +153,7 @@ class Layout:
 
 
 class Place:
-    """Where a field stands in a payload, so that it is read without the others."""
+    """The place of a field in a payload, to read it alone."""
 
     def __init__(self, field: Field, before: Sequence[Field]) -> None:
         self._structs = {n: _struct([field], n) for n in (4, 8)}
@@ -160,7 +163,7 @@ class Place:
         self._real_at = _struct(before[:sizes], 8).size if _has_real([*before, field]) else None
 
     def read(self, payload: bytes) -> Any:
-        """Its value; None where the sender is older than the field."""
+        """Returns its value; None where the sender is older than the field."""
         real = 8 if self._real_at is None else payload[self._real_at]
         numbers, at = self._structs[real], self._at[real]
         if at + numbers.size > len(payload):
@@ -172,7 +175,7 @@ class Place:
 
 
 def places(table: MessageTable) -> dict[str, Place]:
-    """Of all fields of a payload without texts, by name."""
+    """Returns the places of all fields of a payload without texts, by name."""
     fields = table.fields
     return {f.name: Place(f, fields[:k]) for k, f in enumerate(fields) if f.name != "_"}
 
@@ -182,12 +185,12 @@ def _has_real(fields: Sequence[Field]) -> bool:
 
 
 def row_type(fields: Sequence[Field]) -> np.dtype[Any]:
-    """That of numpy for a row of a message."""
+    """Returns numpy's type of a row of a message."""
     return np.dtype([(field.name, CODES[field.type]) for field in fields])
 
 
 def _run_of(field: Field) -> tuple[str, int]:
-    """The size of a real is known behind the fields before the first one."""
+    """Returns the fields' run: earlier fields give the size of a real."""
     return (field.type if field.type in ("text", "real") else "", field.since)
 
 
@@ -212,12 +215,12 @@ def _check(field: Field, value: int) -> None:
 
 
 def stacked(rows: Iterable[Floats], *shape: int) -> Floats:
-    """(n, *shape) of arrays that come one after the other, and are not kept beside it."""
+    """Returns (n, *shape) from successive arrays, without keeping them."""
     return np.fromiter(rows, np.dtype((np.float64, shape)))
 
 
 def unpack_symmetric(packed: Floats, size: int) -> Floats:
-    """(n, size (size + 1) / 2) -> (n, size, size)."""
+    """Unpacks (n, size (size + 1) / 2) to (n, size, size)."""
     out = np.zeros((len(packed), size, size))
     rows, columns = np.tril_indices(size)
     out[:, rows, columns] = packed
@@ -226,6 +229,6 @@ def unpack_symmetric(packed: Floats, size: int) -> Floats:
 
 
 def pack_symmetric(whole: Floats) -> Floats:
-    """(..., size, size) -> (..., size (size + 1) / 2)."""
+    """Packs (..., size, size) to (..., size (size + 1) / 2)."""
     rows, columns = np.tril_indices(whole.shape[-1])
     return np.asarray(whole[..., rows, columns])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Man pages, made of what `--help` says: a page a command, and that of pelorus-replay."""
+"""Makes man pages from `--help`: a page for each command, and that of pelorus-replay."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ CONTROL = re.compile(r"^([.'])", re.M)  # begins a request of roff
 
 
 def text(words: str) -> str:
-    """As roff shows it unchanged."""
+    """Returns words escaped for roff."""
     return CONTROL.sub(r"\\&\1", words.replace("\\", "\\e").replace("-", "\\-"))
 
 
 def write(command: Any, folder: Path) -> list[Path]:
-    """Of the application, and of all commands below it; man looks in its folder man1."""
+    """Writes the pages of the application and its commands into the folder man1."""
     context = command.make_context("pelorus", [], resilient_parsing=True)
     pages = dict(_pages(command, context))
     replay = find_programs(None).float32
@@ -37,7 +37,7 @@ def write(command: Any, folder: Path) -> list[Path]:
 
 
 def _pages(command: Any, context: Any) -> Iterator[tuple[str, str]]:
-    """Name and text."""
+    """Yields name and text of each page."""
     name = context.command_path.replace(" ", "-")
     below = getattr(command, "commands", {})
     yield name, _page(name, command, context, below)
@@ -61,7 +61,7 @@ def _page(name: str, command: Any, context: Any, below: dict[str, Any]) -> str:
 
 
 def _verbatim(name: str, help: str) -> str:
-    """Of a program that lays out its help itself."""
+    """Returns the page of a program that lays out its help itself."""
     usage, _, rest = help.partition("\n\n")
     page = _head(name, "run the filter over a recording")
     page += f".SH SYNOPSIS\n{text(usage.removeprefix('usage: '))}\n"
@@ -81,7 +81,7 @@ def _paragraphs(command: Any) -> list[str]:
 
 
 def _list(title: str, records: list[tuple[str, str]]) -> str:
-    """A section of words and what they mean."""
+    """Returns a section of words and their meanings."""
     rows = [f".TP\n.B {text(word)}\n{text(' '.join(help.split()))}\n" for word, help in records]
     return f".SH {title}\n{''.join(rows)}" if rows else ""
 

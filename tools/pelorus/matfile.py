@@ -45,16 +45,16 @@ class Element(NamedTuple):
 
 
 def is_hdf5(content: bytes) -> bool:
-    """Whether these are the bytes of version 7.3, which is another format."""
+    """Returns whether these are the bytes of version 7.3, which is another format."""
     if HDF5_MAGIC in content[:1024]:
         return True
     return len(content) >= HEADER_BYTES and content[124:126] == struct.pack("<H", LEVEL_7_3)
 
 
 def arrays(content: bytes, most: int) -> dict[str, NDArray[np.generic]]:
-    """Name -> array, column-major as MATLAB has it. What holds no numbers becomes its class's name.
+    """Returns arrays by name, column-major as MATLAB has them, `most` unpacked bytes at most.
 
-    At most so many bytes are unpacked.
+    An array without numbers becomes its class's name.
     """
     order = _byte_order(content)
     found: dict[str, NDArray[np.generic]] = {}

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What all messages have in common: kinds and choices by name, and how a dataclass becomes the
-bytes of a payload by its table in `pelorus.schema`.
+"""The base of all messages: kinds, choices, and the bytes of a payload by its table.
+
+The tables are those of `pelorus.schema`.
 """
 
 from __future__ import annotations
@@ -38,14 +39,14 @@ class Kind(IntEnum):
     CALIBRATION = schema.kind("CALIBRATION")
 
 
-# What comes in time, behind what tells how to read it.
+# Data with a time, after the messages that say how to read them.
 DATA_KINDS = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.READING)
-# Of which there are many in a log: DATA_KINDS, and what answers them.
+# Kinds of which a log has many: DATA_KINDS and their answers.
 MANY = (*DATA_KINDS, Kind.LANDMARK, Kind.POSE, Kind.REPORT, Kind.EVIDENCE)
 
 
 class BodyAxes(IntEnum):
-    """Which way the body's x, y and z point."""
+    """The directions of the body's x, y and z."""
 
     FORWARD_LEFT_UP = schema.number("body_axes", "FORWARD_LEFT_UP")
     FORWARD_RIGHT_DOWN = schema.number("body_axes", "FORWARD_RIGHT_DOWN")
@@ -68,24 +69,24 @@ class Process(IntEnum):
 
 
 class StateAction(IntEnum):
-    """What a STATE asks for."""
+    """The action that a STATE asks for."""
 
     SAVE = schema.number("action", "SAVE")
     RESTORE = schema.number("action", "RESTORE")
 
 
 class Notice(IntEnum):
-    """What a REPORT tells besides its status."""
+    """What a REPORT says besides its status."""
 
     NONE = schema.number("notice", "NONE")
-    # the sender has just started: whatever it was told before is lost
+    # the sender has just started, and lost what it was given before
     STARTED = schema.number("notice", "STARTED")
     SAVED = schema.number("notice", "SAVED")
-    RESTORED = schema.number("notice", "RESTORED")  # the filter goes on from a saved state
+    RESTORED = schema.number("notice", "RESTORED")  # the filter continues from a saved state
 
 
 class Role(IntEnum):
-    """Where a landmark comes from."""
+    """A landmark's origin."""
 
     KNOWN = schema.number("role", "KNOWN")
     EVICTED = schema.number("role", "EVICTED")
@@ -97,8 +98,8 @@ class Message:
 
     kind: ClassVar[Kind]
     layout: ClassVar[Layout]
-    choices: ClassVar[Mapping[str, Callable[[int], Any]]] = {}  # what a number is made into
-    composed: ClassVar[Sequence[str]] = ()  # fields that are not what the table has by their name
+    choices: ClassVar[Mapping[str, Callable[[int], Any]]] = {}  # functions that convert numbers
+    composed: ClassVar[Sequence[str]] = ()  # fields that are not of the table by their name
 
     def __init_subclass__(cls, kind: Kind | None = None) -> None:
         if kind is not None:
@@ -119,19 +120,17 @@ class Message:
 
     @classmethod
     def read(cls, payload: bytes) -> Message:
-        """The same; of a kind of which a log holds many kept as its bytes, in a quarter of the
-        memory.
-        """
+        """Reads it; kinds of which a log has many are kept as bytes, in a quarter of the memory."""
         message = cls.unpack(payload)
         return _kept_as(cls.kind)(payload) if cls.kind in MANY else message
 
     def values(self) -> dict[str, Any]:
-        """By the names of the table."""
+        """Returns the values by the names of the table."""
         return {name: getattr(self, name) for name in _names(self.kind)}
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
-        """The values are those before `end` in the payload; only rows lie behind it."""
+        """Makes a message of values, which end in the payload at `end`; only rows follow."""
         return cls(**values)
 
     def __eq__(self, other: object) -> bool:
@@ -152,7 +151,7 @@ def _names(kind: Kind) -> list[str]:
 
 
 class _Asked:
-    """A field of a message that is kept as its bytes: read when it is asked for."""
+    """A field of a message that is kept as bytes: it is read at each access."""
 
     def __init__(self, kind: Kind, name: str, place: Place | None) -> None:
         self._kind, self._name, self._place = kind, name, place
@@ -165,18 +164,18 @@ class _Asked:
         elif self._choose is not None:
             value = self._choose(value)
         if isinstance(value, np.ndarray):
-            value.flags.writeable = False  # to write into it would change nothing
+            value.flags.writeable = False  # a change would not reach the bytes
         return value
 
 
-@lru_cache(maxsize=4)  # whoever asks for one field asks for its neighbour next
+@lru_cache(maxsize=4)  # readers of one field soon read its neighbour
 def _whole(kind: Kind, payload: bytes) -> Message:
     return _OF_KIND[kind].unpack(payload)
 
 
 @cache
 def _kept_as(kind: Kind) -> Callable[[bytes], Message]:
-    """A subclass that holds nothing but a payload."""
+    """Returns a function that makes an instance of a subclass with nothing but a payload."""
 
     def begin(self: Any, payload: bytes) -> None:
         object.__setattr__(self, "payload", payload)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Whether a trajectory fits another one if its file is read otherwise: its unit, its quaternion's
-order, the direction of its transforms, another frame on the same body.
+"""Tests whether a trajectory fits another one if its file is read otherwise.
 
-Each is a way to write the same poses down, and none of it shows in one file alone: a quaternion
-whose numbers are taken in another order is a rotation too. Two trajectories of one drive tell it.
-Nothing is changed; it is asked.
+Its unit may be another one, its quaternion's order, the direction of its transforms, or its frame
+on the same body. Each is a way to write the same poses, and none shows in one file alone: a
+quaternion whose numbers are taken in another order is a rotation, too. Two trajectories of one
+drive show it. Nothing is changed; the user is asked.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from pelorus.motion import Times
 from pelorus.se3 import Poses
 
 POSES_MIN = 3
-SCALE_MIN = 1.5  # a unit or a monocular camera's; odometry is off by some per cent
+SCALE_MIN = 1.5  # ratio of scales by a unit or a monocular camera; odometry is off by some per cent
 UNITS = {1000.0: "mm", 100.0: "cm", 1 / 0.3048: "feet"}
 UNIT_TOLERANCE = 0.2  # they are three times or more apart
-NEAR_S = 0.1  # of poses that are of one time if a tolerance says so
-BETTER = 2.0  # by so much smaller an error has to become
+NEAR_S = 0.1  # poses that would be of one time with a larger tolerance
+BETTER = 2.0  # least ratio by which an error must become smaller
 FRAME_MIN_DEG = 10.0  # between axes of another frame; less is an error of a mount or an estimate
-UNEXPLAINED_MAX = 0.25  # of the positions' variance, where they fit at all
+UNEXPLAINED_MAX = 0.25  # share of the positions' variance, where they fit at all
 
 
-class Named(NamedTuple):
-    """Poses, and what their file is called."""
+class NamedPoses(NamedTuple):
+    """Poses, and the name of their file."""
 
     name: str
     poses: Poses
 
 
 def times_apart(a: tuple[str, Times], b: tuple[str, Times]) -> str:
-    """What to do where no times of the two are equal: another unit, or a larger tolerance."""
+    """Returns advice where no times of the two are equal: another unit, or a larger tolerance."""
     middle_a, middle_b = float(np.median(a[1])), float(np.median(b[1]))
     larger = max(middle_a, middle_b) / max(min(middle_a, middle_b), 1.0)
     if any(abs(larger / factor - 1) < UNIT_TOLERANCE for factor in (1e3, 1e6, 1e9)):
@@ -52,8 +52,8 @@ def times_apart(a: tuple[str, Times], b: tuple[str, Times]) -> str:
     return f"most are within {near_s:.2g} s: --tolerance {1.1 * near_s:.2g} would take them"
 
 
-class Fit(NamedTuple):
-    """How well b's positions, moved, turned and scaled, are a's."""
+class SimilarityFit(NamedTuple):
+    """How well b's positions, moved, turned and scaled, fit a's."""
 
     scale: float
     scaled_m: float  # RMS distance with the scale
@@ -61,8 +61,8 @@ class Fit(NamedTuple):
     unexplained: float  # share of a's variance, with the scale
 
 
-def doubts(a: Named, b: Named, fixed: bool) -> list[str]:
-    """What is to be asked of poses that were taken at the same times; `fixed`: a is as it is."""
+def doubts(a: NamedPoses, b: NamedPoses, fixed: bool) -> list[str]:
+    """Returns questions about poses of the same times; `fixed`: a was certainly read right."""
     if len(a.poses.p) < POSES_MIN:
         return []
     found = fit(a.poses.p, b.poses.p)
@@ -74,8 +74,8 @@ def doubts(a: Named, b: Named, fixed: bool) -> list[str]:
     return [*_scale(found, a, b), *_turned(found, a, b, fixed)]
 
 
-def fit(a: Floats, b: Floats) -> Fit | None:
-    """a = s R b + t by least squares (Umeyama 1991); None where one of them does not move."""
+def fit(a: Floats, b: Floats) -> SimilarityFit | None:
+    """Fits a = s R b + t by least squares (Umeyama 1991); None where one of them does not move."""
     from_a, from_b = a - a.mean(axis=0), b - b.mean(axis=0)
     moved_a, moved_b = rms(from_a), rms(from_b)
     if not moved_a or not moved_b:
@@ -83,10 +83,10 @@ def fit(a: Floats, b: Floats) -> Fit | None:
     turned = from_b @ se3.nearest_rotation(from_a.T @ from_b).T
     scale = float((turned * from_a).sum() / (turned * turned).sum())
     scaled_m, plain_m = rms(from_a - scale * turned), rms(from_a - turned)
-    return Fit(scale, scaled_m, plain_m, (scaled_m / moved_a) ** 2)
+    return SimilarityFit(scale, scaled_m, plain_m, (scaled_m / moved_a) ** 2)
 
 
-def _scale(found: Fit, a: Named, b: Named) -> list[str]:
+def _scale(found: SimilarityFit, a: NamedPoses, b: NamedPoses) -> list[str]:
     larger = max(found.scale, 1 / found.scale)
     if larger < SCALE_MIN or found.plain_m < BETTER * found.scaled_m:
         return []
@@ -105,7 +105,7 @@ def _scale(found: Fit, a: Named, b: Named) -> list[str]:
 # --- rotations ------------------------------------------------------------------------------------
 
 
-def _turned(found: Fit, a: Named, b: Named, fixed: bool) -> list[str]:
+def _turned(found: SimilarityFit, a: NamedPoses, b: NamedPoses, fixed: bool) -> list[str]:
     as_read = _apart_deg(a.poses.R, b.poses.R)
     sides = [(a, b)] if fixed else [(a, b), (b, a)]
     best_deg, best = as_read / BETTER, ""
@@ -137,7 +137,7 @@ def _readings(R: Floats) -> Iterator[tuple[str, Floats]]:
 
 
 def _steps(R: Floats) -> Floats:
-    """Rotation vectors from the first pose to each, (n, 3): no world's axes are in them."""
+    """Returns (n, 3) rotation vectors from the first pose to each, in no world's axes."""
     return np.asarray(Rotation.from_matrix(R[0].T @ R).as_rotvec())
 
 
@@ -146,11 +146,12 @@ def _apart_deg(R_a: Floats, R_b: Floats) -> float:
     return float(np.degrees(rms(Rotation.from_matrix(between).as_rotvec())))
 
 
-def _other_frame(a: Named, b: Named) -> tuple[float, float, str]:
-    """Poses of another frame that is fixed to the same body: by how much its axes are turned, what
-    is left of the difference then, in degrees, and what to ask.
+def _other_frame(a: NamedPoses, b: NamedPoses) -> tuple[float, float, str]:
+    """Tests whether poses are those of another frame on the same body.
+
+    Returns the angle between the axes, the remaining difference, in degrees, and what to ask.
     """
-    B = se3.nearest_rotation(_steps(a.poses.R).T @ _steps(b.poses.R))  # a's vectors from b's
+    B = se3.nearest_rotation(_steps(a.poses.R).T @ _steps(b.poses.R))  # maps b's vectors to a's
     angle_deg = float(np.degrees(Rotation.from_matrix(B).magnitude()))
     apart_deg = _apart_deg(a.poses.R, b.poses.R @ B.T)
     return (
@@ -163,8 +164,8 @@ def _other_frame(a: Named, b: Named) -> tuple[float, float, str]:
     )
 
 
-def _inverse(a: Named, b: Named, as_read: Fit) -> list[str]:
-    """Where the positions of the inverse transforms fit, and better."""
+def _inverse(a: NamedPoses, b: NamedPoses, as_read: SimilarityFit) -> list[str]:
+    """Returns a question where the positions of the inverse transforms fit better."""
     found = fit(a.poses.p, se3.inverse(b.poses).p)
     if found is None or found.unexplained > min(UNEXPLAINED_MAX, as_read.unexplained / BETTER**2):
         return []

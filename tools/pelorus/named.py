@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Named values of a JSON or YAML file, one by one, with errors that say which one is wrong."""
+"""Reads named values of a JSON or YAML file, with errors that say which one is wrong."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 
 SHOWN_MAX = 60  # characters of a bad value
-NUMBER_MAX = 1e9  # beyond, no calibration's number
+NUMBER_MAX = 1e9  # no calibration has a larger one
 
 
 class Named:
-    """An object of the file; `at` is the name under which it stands in it."""
+    """An object of the file; `at` is its name in it."""
 
     def __init__(self, path: Path, content: dict[str, Any], at: str = "") -> None:
         self.path, self.content, self.at = path, content, at
@@ -24,48 +24,50 @@ class Named:
     def __contains__(self, name: str) -> bool:
         return name in self.content
 
-    def error(self, name: str, value: Any, due: str) -> ForeignFileError:
+    def error(self, name: str, value: Any, expected: str) -> ForeignFileError:
         shown = repr(value)
         shown = shown if len(shown) <= SHOWN_MAX else f"{shown[:SHOWN_MAX]}..."
-        return ForeignFileError(self.path, f"{name} is {shown}", at=self.at, due=due)
+        return ForeignFileError(self.path, f"{name} is {shown}", at=self.at, expected=expected)
 
     def get(self, name: str) -> Any:
         if name not in self.content:
             there = ", ".join(map(str, self.content)) or "none"
             raise ForeignFileError(
-                self.path, f"lacks {name}", at=self.at, due=f"there are: {there}"
+                self.path, f"lacks {name}", at=self.at, expected=f"there are: {there}"
             )
         return self.content[name]
 
     def array(self, name: str, *shape: int) -> Floats:
-        """Finite numbers of this shape; a lone one without a shape."""
+        """Returns finite numbers of this shape; one number without a shape."""
         value = self.get(name)
         array = as_numbers(value)
         if array is None or array.shape != shape or not sane(array):
             size = " x ".join(map(str, shape))
-            due = f"{size} finite numbers are expected" if shape else "a finite number is expected"
-            raise self.error(name, value, due)
+            expected = (
+                f"{size} finite numbers are expected" if shape else "a finite number is expected"
+            )
+            raise self.error(name, value, expected)
         return array
 
     def number(self, name: str) -> float:
         return float(self.array(name))
 
     def word(self, name: str, choices: tuple[str, ...]) -> str:
-        """One of the choices."""
+        """Returns one of the choices."""
         value = self.get(name)
         if not isinstance(value, str) or value not in choices:
             raise self.error(name, value, f"{' or '.join(choices)} is expected")
         return value
 
     def object(self, name: str) -> Named:
-        """What stands under a name, which has names itself."""
+        """Returns the object of this name."""
         value = self.get(name)
         if not isinstance(value, dict):
             raise self.error(name, value, "names with values are expected")
         return Named(self.path, value, f"{self.at}.{name}" if self.at else name)
 
     def size(self, name: str) -> tuple[int, int]:
-        """Width and height, px."""
+        """Returns width and height, px."""
         value = self.get(name)
         sizes = as_numbers(value)
         if sizes is None or sizes.shape != (2,) or not sane(sizes):
@@ -76,12 +78,12 @@ class Named:
 
 
 def sane(array: Floats) -> bool:
-    """Whether these can be numbers of a calibration."""
+    """Returns whether these can be numbers of a calibration."""
     return bool((np.abs(array) <= NUMBER_MAX).all())  # NaN is not
 
 
 def as_numbers(value: Any) -> Floats | None:
-    """Numbers, or lists of them; None for anything else. True is no number, nor is a word."""
+    """Returns numbers, or lists of them; None for anything else. True and words are no numbers."""
     found = np.array(value, dtype=object) if not _ragged(value) else None
     if found is None or not all(
         isinstance(n, (int, float)) and not isinstance(n, bool) for n in found.ravel()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The library in C: where it is, its functions, and its structs as include/pelorus has them.
+"""The library in C: its place, its functions, and its structs as in include/pelorus.
 
-Whoever wants a filter takes `pelorus.Filter`; this is what it stands on.
+Users take `pelorus.Filter`, which is built on this.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ REJECTED = 24  # PLR_SUPERVISION_REJECTED
 
 
 def folders(chosen: Path | None) -> list[Path]:
-    """Where programs and libraries are looked for: in the folder given, else in $PELORUS_BIN, else
-    in the package, and in build/bin here or in the package's checkout.
+    """Returns the folders of programs and libraries: the one given, else $PELORUS_BIN, else the
+    package, and build/bin here or in the package's checkout.
     """
     named = chosen or (Path(value) if (value := os.environ.get("PELORUS_BIN")) else None)
     return [named] if named else [PACKAGED, BUILT, SOURCE_ROOT / BUILT]
@@ -54,7 +54,7 @@ class Pose(Struct):
 
 
 class Twist(Struct):
-    """A velocity in the body's axes; of an IMU specific force and rate."""
+    """A velocity in the body's axes; for an IMU specific force and rate."""
 
     c_name = "plr_twist"
     _fields_ = (("linear", _doubles(3)), ("angular", _doubles(3)))
@@ -127,8 +127,7 @@ class Reading(Struct):
 
 
 class ReadingResult(Struct):
-    """What became of a reading: `used`, and `d2`, its squared distance from what was expected, in
-    sigmas."""
+    """The result of a reading: `used`, and `d2`, its squared distance from the prediction."""
 
     c_name = "plr_reading_result"
     status: int
@@ -139,8 +138,10 @@ class ReadingResult(Struct):
 
 @with_reasons
 class Report(Struct):
-    """What happened to one stereo frame: plr_report of include/pelorus/types.h, where each number
-    is explained. Its reasons are flags: `Reason.FROZEN_IMAGE in report.reasons`."""
+    """The result of one stereo frame: plr_report of include/pelorus/types.h.
+
+    Its reasons are flags: `Reason.FROZEN_IMAGE in report.reasons`.
+    """
 
     c_name = "plr_report"
     t_ns: int
@@ -210,8 +211,10 @@ class RejectedLandmark(Struct):
 
 
 class Supervision(Struct):
-    """What the supervisor saw in one frame and what it decided: plr_supervision of
-    include/pelorus/types.h. Differences are (rho, theta): m and rad in the body's axes."""
+    """What the supervisor saw in one frame and decided: plr_supervision of include/pelorus/types.h.
+
+    Differences are (rho, theta): m and rad in the body's axes.
+    """
 
     c_name = "plr_supervision"
     t_ns: int
@@ -266,8 +269,7 @@ class Supervision(Struct):
 
 @with_reasons
 class Health(Struct):
-    """How far the estimate may be trusted at some time, and why. Seconds since what never happened
-    are infinite."""
+    """How far the estimate may be trusted; seconds since what never happened are infinite."""
 
     c_name = "plr_health_state"
     health: int
@@ -326,7 +328,7 @@ class Setting(Struct):
 
 
 class Sizes(Struct):
-    """What the memory layout of a filter depends on."""
+    """The options that determine the memory layout of a filter."""
 
     c_name = "plr_sizes"
     bytes: int
@@ -412,8 +414,7 @@ OTHER_SIGNATURES: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
 
 
 class Library:
-    """The library in one precision. Its functions are attributes, with the names of the header:
-    `filter_update` is plr_filter_update."""
+    """The library in one precision: its attribute `filter_update` is plr_filter_update."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -432,7 +433,7 @@ class Library:
         self._library.plr_binding_sizes(c.byref(self.sizes))
 
     def _declare(self, path: Path) -> None:
-        """Tells ctypes the functions' types."""
+        """Declares the functions' types to ctypes."""
         try:
             for name, arguments in SIGNATURES.items():
                 function = getattr(self._library, f"plr_filter_{name}")
@@ -446,7 +447,7 @@ class Library:
             ) from error
 
     def _check(self, path: Path) -> None:
-        """The structs above are those that it was compiled with."""
+        """Checks that the structs above are those of the library."""
         version = self._library.plr_version().decode()
         differ = [
             struct.c_name for struct in STRUCTS if self.size_of(struct.c_name) != c.sizeof(struct)
@@ -459,14 +460,14 @@ class Library:
             )
 
     def size_of(self, name: str) -> int:
-        """Bytes of a struct."""
+        """Returns the bytes of a struct."""
         return int(self._library.plr_binding_size_of(name.encode()))
 
     def __getattr__(self, name: str) -> c._CFuncPtr:  # type: ignore[name-defined]
         return getattr(self._library, f"plr_{name}")
 
     def text(self, status: int) -> str:
-        """A sentence about a status: what is wrong and how to correct it."""
+        """Returns a sentence about a status: what is wrong and how to correct it."""
         return str(self._library.plr_status_text(status).decode())
 
 
@@ -477,7 +478,7 @@ def _candidates(precision: Precision) -> Iterator[Path]:
 
 @cache
 def library(precision: Precision = "float32") -> Library:
-    """The library in this precision, loaded once; PelorusError where there is none."""
+    """Returns the library in this precision, loaded once; PelorusError where there is none."""
     if precision not in NAMES:
         raise PelorusError(f"precision {precision!r}: one of {', '.join(NAMES)}")
     for path in _candidates(precision):

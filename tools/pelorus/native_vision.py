@@ -53,7 +53,7 @@ class Rig(_Struct):
 
 
 class Picture(_Struct):
-    """An 8-bit grey picture that lies somewhere."""
+    """An 8-bit grey picture in the caller's memory."""
 
     c_name = "plr_picture"
     _fields_ = (
@@ -66,28 +66,28 @@ class Picture(_Struct):
 
 
 class Pair(_Struct):
-    """Left and right."""
+    """Left and right picture."""
 
     c_name = "plr_picture_pair"
     _fields_ = (("left", Picture), ("right", Picture))
 
 
 class Depth(_Struct):
-    """How far away a point is."""
+    """The known depth of a point."""
 
     c_name = "plr_depth"
     _fields_ = (("id", c.c_uint32), ("z_m", c.c_float))
 
 
 class Expected(_Struct):
-    """How the camera is expected to have moved."""
+    """The expected motion of the camera."""
 
     c_name = "plr_expected"
     _fields_ = (("motion", Pose), ("depths", c.c_void_p), ("depth_count", c.c_uint16))
 
 
 class Sight(_Struct):
-    """What stands beside an observation."""
+    """Data about an observation."""
 
     c_name = "plr_sight"
     _fields_ = (
@@ -99,14 +99,14 @@ class Sight(_Struct):
 
 
 class EndedTrack(_Struct):
-    """A track that ended, and why."""
+    """A track that ended, with the reason."""
 
     c_name = "plr_ended_track"
     _fields_ = (("id", c.c_uint32), ("age", c.c_uint16), ("why", c.c_uint8))
 
 
 class VisionReport(_Struct):
-    """What happened to one pair: plr_vision_report of include/pelorus/vision.h."""
+    """The result of one pair: plr_vision_report of include/pelorus/vision.h."""
 
     c_name = "plr_vision_report"
     t_ns: int
@@ -168,7 +168,7 @@ class VisionLibrary(Protocol):
 
 @cache
 def library(precision: Precision = "float32") -> VisionLibrary:
-    """The library, with these functions declared; PelorusError where it was built without them."""
+    """Returns the library with these functions; raises PelorusError if it has none."""
     found = native.library(precision)
     differ = [s.c_name for s in STRUCTS if found.size_of(s.c_name) != c.sizeof(s)]
     try:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What all commands that write a file have in common: a file that is there is kept unless --force
-is given, and as the name of a file - is the standard output.
+"""What all commands that write a file have in common.
+
+An existing file is kept unless --force is given, and as the name of a file - is the standard
+output.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from typer.models import ParameterInfo
 from pelorus.console import leave_standard_output
 from pelorus.errors import STANDARD_OUTPUT, Existing
 
-FOLDER = "DIR"  # the metavar of an output that is one
+FOLDER = "DIR"  # the metavar of an output folder
 FORCE = inspect.Parameter(
     "force",
     inspect.Parameter.KEYWORD_ONLY,
@@ -27,7 +29,7 @@ FORCE = inspect.Parameter(
 
 
 def guard_outputs(app: typer.Typer) -> None:
-    """Each command of the application, and of those below it."""
+    """Guards the outputs of each command of the application, and of those below it."""
     for group in app.registered_groups:
         if group.typer_instance is not None:
             guard_outputs(group.typer_instance)
@@ -65,7 +67,7 @@ def _guarded(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _is_output(about: object) -> bool:
-    """OUT.plr and the like, or --out. What is in a folder the command itself knows."""
+    """Returns whether it is OUT.plr and the like, or --out; not what is in a folder."""
     return isinstance(about, ParameterInfo) and (
         (about.metavar or "").startswith("OUT") or "--out" in (about.param_decls or ())
     )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Recordings as they lie on a disk: plain (.plr), or packed by zstd (.plr.zst).
+"""Recordings on disk: plain (.plr), or packed by zstd (.plr.zst).
 
-What is read is told by its first bytes, what is written by its name. Inside, the frames are the
-same: `zstdcat FILE.plr.zst` gives the plain recording.
+When reading, the first bytes decide; when writing, the name. The frames inside are the same:
+`zstdcat FILE.plr.zst` gives the plain recording.
 """
 
 from __future__ import annotations
@@ -21,28 +21,29 @@ else:
 
 SUFFIX = ".zst"
 MAGIC = b"\x28\xb5\x2f\xfd"  # of a zstd frame (RFC 8878, 3.1.1)
-LEVEL, LIVE_LEVEL = 19, 3  # a finished recording has time; a log is written while a robot waits
-LIVE_BYTES = 1 << 15  # after so many of a live log the block is closed, and outlives a crash
+LEVEL, LIVE_LEVEL = 19, 3  # level of a finished recording, and of a log, for which a robot waits
+LIVE_BYTES = 1 << 15  # after so many a live log's block is closed, and outlives a crash
 
 
 class PackingDamaged(PelorusError):
-    """Nothing behind this place can be unpacked."""
+    """Nothing after this place can be unpacked."""
 
 
 def is_packed(path: Path) -> bool:
-    """Whether the name asks for zstd."""
+    """Returns whether the name asks for zstd."""
     return path.suffix == SUFFIX
 
 
 def bare_name(path: Path) -> str:
-    """The file's name without .plr, .plr.zst."""
+    """Returns the file's name without .plr, .plr.zst."""
     return (path.with_suffix("") if is_packed(path) else path).stem
 
 
 def pieces(path: Path, piece_bytes: int = 1 << 16) -> Iterator[bytes]:
-    """The recording's bytes, unpacked where they are packed.
+    """Yields the recording's bytes, unpacked if need be.
 
-    OSError where the disk fails; PackingDamaged behind the last bytes that could be unpacked.
+    Raises OSError where the disk fails, and PackingDamaged after the last bytes that could be
+    unpacked.
     """
     with path.open("rb") as stream:
         if stream.peek(len(MAGIC))[: len(MAGIC)] == MAGIC:
@@ -53,8 +54,10 @@ def pieces(path: Path, piece_bytes: int = 1 << 16) -> Iterator[bytes]:
 
 
 def _unpacked(stream: BinaryIO, piece_bytes: int) -> Iterator[bytes]:
-    """Of all packed frames, one behind the other; of the last one as much as is there. zstd's own
-    file object gives nothing of the last piece of a file that was cut.
+    """Yields the content of all packed frames in order, and what there is of an incomplete last
+    one.
+
+    zstd's own file object gives nothing of the last piece of a file that was cut.
     """
     unpacker = zstd.ZstdDecompressor()
     while True:
@@ -73,17 +76,17 @@ def _unpacked(stream: BinaryIO, piece_bytes: int) -> Iterator[bytes]:
 
 
 def create(path: Path, packed: bool, live: bool = False) -> BinaryIO:
-    """A file to write a recording to; OSError where there can be none.
+    """Opens a file to write a recording to; raises OSError where that fails.
 
-    `live`: of what was written, all but the last LIVE_BYTES stays readable if the program is
-    killed; plain, all of it.
+    `live`: if the program is killed, all that was written but the last LIVE_BYTES stays readable;
+    in a plain file, all of it.
     """
     stream = path.open("wb")
     return cast(BinaryIO, _Packer(stream, live)) if packed else stream
 
 
 class _Packer:
-    """Packs what it is given; as much of a file as a recording's writers need."""
+    """Packs its input; has as much of a file's interface as a recording's writers need."""
 
     def __init__(self, stream: BinaryIO, live: bool) -> None:
         level = LIVE_LEVEL if live else LEVEL
@@ -102,7 +105,7 @@ class _Packer:
         return len(data)
 
     def flush(self) -> None:
-        """Closes a block where it is large enough: a block each message would pack badly."""
+        """Closes a block where it is large enough: a block for each message would pack badly."""
         if self._live and self._held >= LIVE_BYTES:
             self._stream.write(self._packer.flush(self._packer.FLUSH_BLOCK))
             self._held = 0
@@ -117,7 +120,7 @@ class _Packer:
 
 
 def for_program(path: Path) -> tuple[str, bytes | None]:
-    """A recording as an argument of pelorus-replay, and what it is to read from standard input.
+    """Returns a recording as an argument of pelorus-replay, and what to feed to its standard input.
 
     A packed one is unpacked here: the program need not know zstd.
     """
@@ -126,7 +129,7 @@ def for_program(path: Path) -> tuple[str, bytes | None]:
             if stream.read(len(MAGIC)) == MAGIC:
                 return "-", b"".join(pieces(path))
     except OSError:
-        pass  # the program opens it next, and says why it cannot
+        pass  # the program opens it next, and reports the error
     except PackingDamaged as error:
         raise PelorusError(f"{path}: {error}") from error
     return str(path), None

@@ -9,7 +9,7 @@ from pelorus import schema
 
 
 class Reason(IntFlag):
-    """Flags of a report or of a health; bits of a later version, without a name here, stay."""
+    """Flags of a report or of a health; unknown bits of a later version are kept."""
 
     FEW_OBSERVATIONS = 1 << 0
     NO_OBSERVATIONS = 1 << 1
@@ -41,10 +41,10 @@ class Reason(IntFlag):
     CALIBRATION_OFF = 1 << 28
 
     def __str__(self) -> str:
-        """`FROZEN_IMAGE|NO_TWISTS`; `none` where there is nothing."""
+        """Returns `FROZEN_IMAGE|NO_TWISTS`; `none` without flags."""
         return self.name or "none"
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What each of them means; include/pelorus/types.h says causes and remedies."""
+        """Returns the meaning of each; include/pelorus/types.h has causes and remedies."""
         return tuple(schema.REASONS[reason.value] for reason in self)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A whole recording in memory: what the converters and the simulator write."""
+"""A whole recording in memory, as converters and simulation write it."""
 
 from __future__ import annotations
 
@@ -38,8 +38,10 @@ from pelorus.wire import write_file
 
 @dataclass(frozen=True)
 class Recording:
-    """Twists (m, 3) at `twist_t_ns` or readings of an IMU, frame k of the tracks at
-    `frame_t_ns[k]`, body poses.
+    """A recording.
+
+    It has twists (m, 3) at `twist_t_ns` or readings of an IMU, frame k of the tracks at
+    `frame_t_ns[k]`, and body poses.
     """
 
     header: Header
@@ -55,7 +57,7 @@ class Recording:
     known: list[Landmark] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)  # of small sensors, in any order
     remarks: list[Text] = field(default_factory=list)
-    camera_delay_ns: int = 0  # frames stand so much later in the file, as they come off a robot
+    camera_delay_ns: int = 0  # frames come so much later in the file, as from a robot
     twist_delay_ns: int = 0  # twists likewise, and readings of an IMU
     inertial: Inertial = NO_READINGS  # in place of twists
     imu_batch: int = IMU_READINGS_MAX  # readings of a message, at most
@@ -77,30 +79,30 @@ class Recording:
 
     @property
     def motion_words(self) -> str:
-        """What there is of motion, counted."""
+        """Returns the number of twists or readings, in words."""
         readings = len(self.inertial.t_ns)
         return f"{readings} IMU readings" if readings else f"{len(self.twist_t_ns)} twists"
 
     def dead_reckoning(self) -> Poses:
-        """The body's poses at the frames, from the twists alone; the first twist is the origin."""
+        """Returns the body's poses at the frames by twists; the first twist is the origin."""
         timing = self.header.twist_timing
         return motion.path_at(
             self.frame_t_ns, self.twist_t_ns, self.v_B_mps, self.w_B_radps, timing
         )
 
     def body_motion(self, lag: int) -> Poses:
-        """(T - lag) motions: coordinates in body k -> body k + lag, from the twists alone."""
+        """Returns (T - lag) maps of coordinates in body k to body k + lag, by the twists alone."""
         path = self.dead_reckoning()
         later, earlier = path.at(slice(lag, None)), path.at(slice(None, max(len(path.p) - lag, 0)))
         return se3.compose(se3.inverse(later), earlier)
 
     def camera_motion(self, lag: int) -> Poses:
-        """The same between cameras: T_CB D T_CB^-1."""
+        """Returns the same between cameras: T_CB D T_CB^-1."""
         motion_B = self.body_motion(lag)
         return se3.compose(se3.compose(self.T_CB, motion_B), se3.inverse(self.T_CB))
 
     def messages(self) -> Iterator[Message]:
-        """In the order that docs/REPLAY-FORMAT.md asks for."""
+        """Yields the messages in the order of docs/REPLAY-FORMAT.md."""
         yield self.header
         if self.settings:
             yield Config({IDS[name]: value for name, value in self.settings.items()})
@@ -129,7 +131,7 @@ class Recording:
             yield t + self.twist_delay_ns, 0, Twist(t, v, w)
 
     def _imu(self) -> Iterator[tuple[int, int, Message]]:
-        """A message stands where its last reading was taken."""
+        """Yields the IMU's messages, each at the time of its last reading."""
         small = np.array([reading.t_ns for reading in self.readings], np.int64)
         cuts = np.union1d(self.frame_t_ns, small)
         for t, message in inertial.messages(self.inertial, cuts, self.imu_batch):
@@ -161,7 +163,7 @@ class Recording:
             yield t + self.camera_delay_ns, 3, Stereo(t, ids[rows], pixels[rows])
 
     def write(self, path: Path) -> int:
-        """Write the whole file; its size in bytes. Nothing is left behind if that fails."""
+        """Writes the whole file; returns its size in bytes. Nothing remains if that fails."""
         self._check(path)
         return write_file(path, self.messages(), len(self))
 

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The relative pose error by the length of the way: how a trajectory drifts, wherever it begins.
+"""The relative pose error by distance travelled: how a trajectory drifts, wherever it begins.
 
-For each start i and length L, with j the first frame at which the true way since i is L or more:
+For each start i and length L, with j the first frame at which the true distance since i is L or
+more:
 
     E = (T_i^-1 T_j)^-1 (T*_i^-1 T*_j)        T the estimate, T* the truth
 
-|p(E)| / L and the angle of R(E) / L are what is told, as RMS over the starts. Geiger, Lenz,
-Urtasun: Are we ready for autonomous driving? The KITTI vision benchmark suite, 2012.
+The figures are |p(E)| / L and the angle of R(E) / L, as RMS over the starts. Geiger, Lenz, Urtasun:
+Are we ready for autonomous driving? The KITTI vision benchmark suite, 2012.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from pelorus.evaluation import Accuracy
 from pelorus.layout import Floats
 
 STARTS_MOST = 2000
-STARTS_LEAST = 10  # fewer say little: they share their way
+STARTS_LEAST = 10  # fewer say little, for they share most of their path
 LENGTHS_MOST = 7
-SHARE = 0.5  # of the way; longer ones have few starts that differ
+SHARE = 0.5  # of the path; longer ones have few distinct starts
 
 
 class Drift(NamedTuple):
-    """Over one length: RMS over `starts`."""
+    """The drift over one length: RMS over `starts`."""
 
     length_m: float
     starts: int
@@ -45,7 +46,7 @@ class Drift(NamedTuple):
 
 
 def drifts(accuracy: Accuracy) -> list[Drift]:
-    """Of the longest lengths 1, 2, 5, 10 ... that half the way holds; short ones first."""
+    """Returns the drifts over lengths 1, 2, 5, 10 ... up to half the path; short ones first."""
     steps = np.linalg.norm(np.diff(accuracy.truth.p, axis=0), axis=1)
     way = np.concatenate(([0.0], np.cumsum(steps)))
     found = (_drift(accuracy, way, length) for length in _lengths(float(way[-1])))
@@ -66,10 +67,10 @@ def _drift(accuracy: Accuracy, way: Floats, length_m: float) -> Drift | None:
     starts = starts[:: -(-len(starts) // STARTS_MOST) or 1]
     if len(starts) < STARTS_LEAST:
         return None
-    mine, due = (
+    mine, expected = (
         se3.compose(se3.inverse(poses.at(starts)), poses.at(ends[starts]))
         for poses in (accuracy.estimate, accuracy.truth)
     )
-    error = se3.compose(se3.inverse(mine), due)
+    error = se3.compose(se3.inverse(mine), expected)
     angles = se3.log(error)[:, 3:]
     return Drift(length_m, len(starts), rms(error.p), float(np.degrees(rms(angles))))

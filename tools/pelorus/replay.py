@@ -31,7 +31,7 @@ class Programs:
 
 
 def find_programs(folder: Path | None) -> Programs:
-    """From the folder given, else from $PELORUS_BIN, else from the package or build/bin."""
+    """Returns the programs in the folder given, else in $PELORUS_BIN, the package or build/bin."""
     candidates = native.folders(folder)
     for candidate in candidates:
         programs = Programs(
@@ -62,7 +62,7 @@ class Outputs:
 def replay(
     program: Path, recording: Path, options: Sequence[str], outputs: Outputs
 ) -> tuple[dict[str, Any], list[str]]:
-    """Run the filter; its summary, and what it had to say on the way."""
+    """Runs the filter; returns its summary and its remarks."""
     wanted = [
         *("--trajectory", str(outputs.trajectory), "--out", str(outputs.log), "--force", "--json"),
     ]
@@ -80,7 +80,7 @@ class NothingUsefulError(PelorusError):
 
 
 def stuffed_answers(program: Path, recording: Path, options: Sequence[str]) -> list[bytes]:
-    """Returns the frames of what the filter answers to a recording, still to be read."""
+    """Returns the frames of the filter's answers to a recording, not yet decoded."""
     with tempfile.TemporaryDirectory(prefix="pelorus-", dir=recording.parent) as folder:
         answers = Path(folder) / "answers.plr"
         run_program(program, recording, ["--quiet", *options, "--out", str(answers)])
@@ -88,7 +88,7 @@ def stuffed_answers(program: Path, recording: Path, options: Sequence[str]) -> l
 
 
 def replayed(program: Path, inputs: Iterable[Message], options: Sequence[str]) -> list[Message]:
-    """What the filter answers to these messages, with them."""
+    """Returns these messages with the filter's answers."""
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         recording, answers = Path(folder) / "inputs.plr", Path(folder) / "answers.plr"
         with writing(recording), recording.open("wb") as stream:
@@ -106,7 +106,7 @@ def replayed(program: Path, inputs: Iterable[Message], options: Sequence[str]) -
 
 
 def result_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:
-    """The messages of a result as they are; of a recording those of a replay in float32."""
+    """Returns a result's messages as they are, or those of a recording's replay in float32."""
     messages, counts = counted_messages_of(source)
     lost = counts.damaged + counts.malformed + counts.too_long
     if lost:
@@ -127,7 +127,7 @@ def result_of(source: Path, options: Sequence[str], programs: Path | None) -> li
 
 
 def whole_log_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:
-    """A result that says what became of its frames, too."""
+    """Returns a result that has reports of its frames, too."""
     messages = result_of(source, options, programs)
     if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
         raise PelorusError(f"{source}: holds no REPORT of a frame: a whole log is expected")
@@ -135,7 +135,7 @@ def whole_log_of(source: Path, options: Sequence[str], programs: Path | None) ->
 
 
 def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> float:
-    """The max-depth that would be in force, 0 for none: the program knows its own config files."""
+    """Returns the max-depth in force, 0 for none; the program reads its own config files."""
     stdout, _ = run_program(program, recording, [*options, "--print-config"])
     for line in stdout.splitlines():
         name, _, value = line.partition("=")
@@ -147,7 +147,7 @@ def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> flo
 def run_program(program: Path, recording: Path, options: Sequence[str]) -> tuple[str, str]:
     """Returns what it printed on both streams.
 
-    Raises PelorusError, with its words, where it did not end well.
+    Raises PelorusError with its words if it fails.
     """
     name, unpacked = packed_file.for_program(recording)
     command = [str(program), name, *options]
@@ -160,6 +160,6 @@ def run_program(program: Path, recording: Path, options: Sequence[str]) -> tuple
     if done.returncode != 0:
         how = f"status {done.returncode}" if done.returncode > 0 else f"signal {-done.returncode}"
         said = stderr.replace(f"{program.name}: ", "").strip() or "it said nothing"
-        error = NothingUsefulError if done.returncode == 1 else PelorusError
-        raise error(f"{recording}: {program.name} ended with {how}:\n{said}")
+        raised = NothingUsefulError if done.returncode == 1 else PelorusError
+        raise raised(f"{recording}: {program.name} ended with {how}:\n{said}")
     return stdout, stderr

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The commands `pelorus-replay` and `pelorus-replay-f64`, which pip puts on the PATH: they become
-the program in C, which stands in the package or in build/bin.
+"""The commands `pelorus-replay` and `pelorus-replay-f64`, which pip puts on the PATH.
+
+They become the program in C, which is in the package or in build/bin.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 
-ROAD_STEP_M = 1.0  # the road's points are interpolated to this spacing
+ROAD_STEP_M = 1.0  # spacing to which the road's points are interpolated
 EVERY = 5  # one pose in five is compared
 STARTS = 24  # headings from which the fit is tried, each mirrored too
 EVALUATIONS_MAX = 60
@@ -37,21 +37,21 @@ class RoadFigures:
 
 
 def read_road(path: Path) -> Floats:
-    """(n, 2), m: the last two columns of a CSV; lines with # in front are comments."""
+    """Returns (n, 2), m: the last two columns of a CSV; lines with # in front are comments."""
     rows = foreign.rows(path)
     columns = len(rows[0].cells)
     if len(rows) < 2 or columns < 2:
         raise ForeignFileError(
             path,
             f"is no road: {len(rows)} rows of {columns} numbers",
-            due="at least two rows arc_m,x_m,y_m are expected",
+            expected="at least two rows arc_m,x_m,y_m are expected",
         )
     return foreign.numbers(path, rows)[:, -2:]
 
 
 @dataclass(frozen=True)
 class RoadFit:
-    """How a trajectory came to lie on the road: levelled, mirrored or not, turned, shifted."""
+    """The placement of a trajectory on the road: levelled, mirrored or not, turned, shifted."""
 
     figures: RoadFigures
     middle_m: Floats  # (3,)
@@ -61,18 +61,18 @@ class RoadFit:
     shift_m: Floats  # (2,)
 
     def place(self, points: Floats) -> Floats:
-        """Points of the trajectory's world (n, 3) -> the road's map (n, 2), m."""
+        """Maps points of the trajectory's world (n, 3) to the road's map (n, 2), m."""
         return _moved((points - self.middle_m) @ self.axes.T * self.mirror,
                       np.array([self.turn_rad, *self.shift_m]))  # fmt: skip
 
 
 def compare(position: Floats, road: Floats, skip_m: float) -> RoadFigures:
-    """Positions (n, 3), m, against the road (n, 2), m."""
+    """Compares positions (n, 3), m, with the road (n, 2), m."""
     return fit(position, road, skip_m).figures
 
 
 def fit(position: Floats, road: Floats, skip_m: float) -> RoadFit:
-    """The best fit of positions (n, 3), m, to the road (n, 2), m."""
+    """Returns the best fit of positions (n, 3), m, to the road (n, 2), m."""
     middle = position.mean(axis=0)
     centred = position - middle
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
@@ -92,27 +92,28 @@ def fit(position: Floats, road: Floats, skip_m: float) -> RoadFit:
 
 
 def arc_length(points: Floats) -> Floats:
-    """(n,): way along the points from the first one, m."""
+    """Returns (n,) the distance along the points from the first one, m."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def densified(road: Floats) -> Floats:
-    """The road with a point every ROAD_STEP_M."""
+    """Returns the road with a point every ROAD_STEP_M."""
     arc = arc_length(road)
     at = np.arange(0, arc[-1], ROAD_STEP_M)
     return np.stack([np.interp(at, arc, road[:, axis]) for axis in range(2)], axis=-1)
 
 
 def _moved(points: Floats, motion: Floats) -> Floats:
-    """(n, 2) turned by motion[0] and shifted by the rest."""
+    """Returns (n, 2) turned by motion[0] and shifted by the rest."""
     c, s = np.cos(motion[0]), np.sin(motion[0])
     return np.asarray(points @ np.array([[c, s], [-s, c]]) + motion[1:])
 
 
 def _fit(points: Floats, road: Floats) -> tuple[float, Floats, Floats]:
-    """The smallest RMS distance over all planar motions, mirrored or not (axes have no sign), with
-    the mirror and the motion that give it.
+    """Returns the least RMS distance over planar motions and mirrors, and these.
+
+    Mirrors count, for principal axes have no sign.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - loads slowly
 

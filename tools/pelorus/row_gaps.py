@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How well a pair is rectified, by what its tracks show: a point's rows should be the same.
+"""Measures how well a pair is rectified by its tracks: a point's rows should be equal.
 
-What varies smoothly over the picture is no tracker's noise but an error of the calibration, of the
-lens or of how the cameras are turned. All points of a region share it, in every frame; along the
-row, where depths are told, it is likely as large, and cannot be seen.
+An error that varies smoothly over the picture is not the tracker's noise but the calibration's, of
+the lens or of the cameras' orientation. All points of a region share it, in every frame; along the
+row, where disparities are measured, it is probably as large, and cannot be seen.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from pelorus.tracks import Tracks
 
 OBSERVATIONS_MIN = 200
 TRACKS_MIN = 30
-FAR_PX = 2.0  # from the median: a bad match
+FAR_PX = 2.0  # from the median; beyond it is a bad match
 ROUNDS = 10
 TERMS = 6  # 1, x, y, x^2, x y, y^2
-TOLD_ABOVE_PX = 0.15  # a good calibration is within
+TOLD_ABOVE_PX = 0.15  # good calibrations stay below
 
 
 class RowGaps(NamedTuple):
-    """Of vL - vR, px: what varies smoothly (RMS, largest), and what is left of each match (RMS)."""
+    """Parts of vL - vR, px: the smooth part (RMS, largest), and each match's remainder (RMS)."""
 
     smooth_px: float
     largest_px: float
@@ -32,19 +32,19 @@ class RowGaps(NamedTuple):
 
     @property
     def shared_px(self) -> float:
-        """What of it is in one of the two pictures' numbers."""
+        """Returns the part of it in one picture's pixels."""
         return self.smooth_px / float(np.sqrt(2))
 
     def stands_for_px(self, points: float) -> float:
-        """The pixel sigma whose mean over a frame's points is no better known than this error."""
+        """Returns the pixel sigma with which a frame's mean is no better than this error."""
         return self.shared_px * float(np.sqrt(points))
 
 
 def row_gaps(tracks: Tracks) -> RowGaps | None:
-    """A polynomial of second degree over the left picture, with weights against bad matches.
+    """Fits a polynomial of second degree over the left picture, with weights against bad matches.
 
-    What chance makes of noise that a track keeps through its life is taken off. None where there
-    are too few observations to tell.
+    What chance makes of persistent noise of a track is subtracted. None where there are too few
+    observations.
     """
     gap = tracks.pixels[:, 1] - tracks.pixels[:, 3]
     near = np.abs(gap - np.median(gap)) < FAR_PX if len(gap) else np.zeros(0, np.bool_)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The tables that the library in C is built from, as `pelorus-schema` prints them (tools/schema):
-layouts of messages, settings, statuses, reasons, limits. None of it is written a second time here.
+"""The tables from which the library in C is built, as `pelorus-schema` prints them (tools/schema).
+
+They are layouts of messages, settings, statuses, reasons and limits, none of which is repeated
+here.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ class Field:
     since: int = 0  # minor version
     least: int | None = None
     most: int | None = None  # of a text its bytes
-    values: Sequence[int] = ()  # nothing else is allowed
+    values: Sequence[int] = ()  # only these are allowed, if any
     unit: str = ""
     about: str = ""
 
@@ -47,7 +49,7 @@ class Setting:
     unit: str = ""
     words: tuple[str, ...] = ()
     is_list: bool = False  # some of the words, as bits
-    of_axis: int = 0  # id of the setting that sets this one too, the sigma of a single axis
+    of_axis: int = 0  # id of the setting for all axes that sets this one, too
 
 
 def _message(row: dict[str, Any]) -> MessageTable:
@@ -68,7 +70,7 @@ SENSORS: dict[str, int] = {  # the small ones, by name
     row["name"].lower(): int(row["number"]) for row in _TABLES["enums"] if row["of"] == "sensor"
 }
 LIMITS: dict[str, int] = _TABLES["limits"]
-PLAUSIBLE: dict[str, float] = _TABLES["plausible"]  # what a session refuses is beyond
+PLAUSIBLE: dict[str, float] = _TABLES["plausible"]  # a session refuses larger values
 MESSAGES: dict[str, MessageTable] = {row["name"]: _message(row) for row in _TABLES["messages"]}
 SETTINGS: dict[int, Setting] = {row["id"]: _setting(row) for row in _TABLES["settings"]}
 DEFAULTS: dict[str, float] = {
@@ -83,7 +85,7 @@ REASON_NAMES: dict[int, str] = {
 
 
 def number(of: str, name: str) -> int:
-    """What stands for a name: number("status", "CORRUPT") is -15."""
+    """Returns the number of a name: number("status", "CORRUPT") is -15."""
     return next(
         int(row["number"])
         for row in (*_TABLES["enums"], *_TABLES["words"])
@@ -92,11 +94,11 @@ def number(of: str, name: str) -> int:
 
 
 def word_of(setting: str, value: float) -> str:
-    """The word of a choice's value: word_of("process", 1) is "imu"."""
+    """Returns the word of a choice's value: word_of("process", 1) is "imu"."""
     row = next(row for row in SETTINGS.values() if row.name == setting)
     return row.words[int(value)]
 
 
 def kind(name: str) -> int:
-    """The number of a kind of message."""
+    """Returns the number of a kind of message."""
     return MESSAGES[name].kind

@@ -32,7 +32,7 @@ IDENTITY = Poses(np.eye(3), np.zeros(3))
 
 
 def skew(x: ArrayLike) -> Floats:
-    """[x]x, (..., 3) -> (..., 3, 3)."""
+    """Returns [x]x, (..., 3) -> (..., 3, 3)."""
     x = np.asarray(x, float)
     out = np.zeros((*x.shape, 3))
     out[..., 2, 1] = x[..., 0]
@@ -42,35 +42,35 @@ def skew(x: ArrayLike) -> Floats:
 
 
 def exp(rho: ArrayLike, theta: ArrayLike) -> Poses:
-    """Exp(rho, theta) = (Exp theta, V rho)."""
+    """Returns Exp(rho, theta) = (Exp theta, V rho)."""
     T = RigidTransform.from_exp_coords(np.concatenate((theta, rho), axis=-1))
     return Poses(T.rotation.as_matrix(), T.translation)
 
 
 def log(T: Poses) -> Floats:
-    """The twist (..., 6) in the order (rho, theta) with Exp of it = T."""
+    """Returns the twist (..., 6) in the order (rho, theta) with Exp of it = T."""
     rigid = RigidTransform.from_components(T.p, Rotation.from_matrix(T.R))
     return np.roll(rigid.as_exp_coords(), 3, axis=-1)  # scipy's order is (theta, rho)
 
 
 def inverse(T: Poses) -> Poses:
-    """T^-1."""
+    """Returns T^-1."""
     Rt = np.swapaxes(T.R, -1, -2)
     return Poses(Rt, -np.einsum("...ij,...j->...i", Rt, T.p))
 
 
 def compose(A: Poses, B: Poses) -> Poses:
-    """A B."""
+    """Returns A B."""
     return Poses(A.R @ B.R, apply(A, B.p))
 
 
 def apply(T: Poses, s: Floats) -> Floats:
-    """R s + p."""
+    """Returns R s + p."""
     return np.asarray(np.einsum("...ij,...j->...i", T.R, s) + T.p)
 
 
 def nearest_rotation(M: ArrayLike) -> Floats:
-    """The rotation closest to M in the Frobenius norm."""
+    """Returns the rotation closest to M in the Frobenius norm."""
     u, _, vt = np.linalg.svd(np.asarray(M, float))
     u[..., :, 2] *= np.linalg.det(u @ vt)[..., None]
     return np.asarray(u @ vt)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Where points of one frame stand in another: as left pixel and disparity, with derivatives.
+"""Predicts points of one frame in another, as left pixel and disparity, with derivatives.
 
-A rectified pair has a point in one row, so that its four pixels are three numbers: what the rows
-differ by is noise, and says nothing of the motion.
+A rectified pair has a point in one row, so that its four pixels are three numbers: the rows differ
+by noise alone, which contains nothing of the motion.
 """
 
 from __future__ import annotations
@@ -12,29 +12,31 @@ import numpy as np
 from pelorus.frames import Camera
 from pelorus.layout import Floats
 
-# Of (uL, v, disparity) with v the mean of both rows, for pixels of unit noise; and its pivots.
+# Covariance of (uL, v, disparity) with v the mean of both rows, for pixels of unit noise; its
+# pivots.
 NOISE = np.array([[1.0, 0.0, 1.0], [0.0, 0.5, 0.0], [1.0, 0.0, 2.0]])
 PIVOTS = (1.0, 0.5, 1.0)
 
 
 def measured(camera: Camera, pixels: Floats) -> Floats:
-    """(uL, v, disparity) beside the principal point, px."""
+    """Returns (uL, v, disparity) relative to the principal point, px."""
     u, v = pixels[:, 0] - camera.cx_px, 0.5 * (pixels[:, 1] + pixels[:, 3]) - camera.cy_px
     return np.stack((u, v, pixels[:, 0] - pixels[:, 2]), axis=-1)
 
 
 def predicted(camera: Camera, x: Floats, R: Floats, p: Floats) -> Floats:
-    """Where points x (n, 3) of the first view stand in the second, (n, 3)."""
+    """Returns points x (n, 3) of the first view in the second, (n, 3)."""
     return linearised(camera, x.T, np.moveaxis(R, 0, -1), p.T)[0].T
 
 
-# From here on the points are the last axis: of many small matrices numpy takes one by one, of these
+# From here on the points are the last axis: numpy takes many small matrices one by one, but here
 # each element for all points at once.
 
 
 def linearised(camera: Camera, x: Floats, R: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
-    """Where points x (3, n) of the first view stand in the second, h (3, n); dh/dx (3, 3, n); and
-    dh/d motion (3, 6, n), NaN-free even behind the camera.
+    """Returns points x (3, n) of the first view in the second, h (3, n), with derivatives.
+
+    These are dh/dx (3, 3, n) and dh/d motion (3, 6, n), without NaN even behind the camera.
     """
     focal = np.array([camera.fx_px, camera.fy_px, camera.fx_px * camera.baseline_m])
     inverse_depth = x[2] / focal[2]
@@ -60,9 +62,10 @@ def linearised(camera: Camera, x: Floats, R: Floats, p: Floats) -> tuple[Floats,
 
 
 def inverse(S: Floats) -> Floats:
-    """Of symmetric (3, 3, n) that are NOISE and more: by L D L^T, whose pivots are no smaller than
-    those of NOISE. A point that is hardly known in depth makes S so large that rounding alone would
-    make them negative, and its d^2.
+    """Inverts symmetric S (3, 3, n), NOISE or larger, by L D L^T.
+
+    No pivot is taken smaller than NOISE's. A point of nearly unknown depth makes S so large that
+    rounding alone would make pivots negative, and d^2 with them.
     """
     (a, b, c), (_, d, e), (_, _, f) = S
     l10, l20 = b / a, c / a
@@ -81,10 +84,10 @@ def inverse(S: Floats) -> Floats:
 
 
 def apply(A: Floats, x: Floats) -> Floats:
-    """A x, of (i, j, n) and (j, n)."""
+    """Returns A x, of (i, j, n) and (j, n)."""
     return np.asarray(np.einsum("ijn,jn->in", A, x))
 
 
 def product(A: Floats, B: Floats) -> Floats:
-    """A B, of (i, j, n) and (j, k, n)."""
+    """Returns A B, of (i, j, n) and (j, k, n)."""
     return np.asarray(np.einsum("ijn,jkn->ikn", A, B))

@@ -20,7 +20,7 @@ __all__ = [
 
 IDS = {setting.name: id for id, setting in SETTINGS.items()}
 
-# What the covariances contain of errors of the camera; 0: it is exact.
+# Errors of the camera that the covariances cover; 0: it is exact.
 CALIBRATION_SIGMAS = (
     "focal-sigma",
     "baseline-sigma",
@@ -32,7 +32,7 @@ CALIBRATION_SIGMAS = (
 
 
 def describe(id: int, value: float) -> tuple[str, str]:
-    """Name and value with its unit; an id of a later version shows as its number."""
+    """Returns name and value with its unit; an unknown id of a later version as a number."""
     setting = SETTINGS.get(id, Setting(f"setting {id}"))
     if setting.is_list:
         listed = [word for bit, word in enumerate(setting.words) if int(value) >> bit & 1]
@@ -44,12 +44,12 @@ def describe(id: int, value: float) -> tuple[str, str]:
 
 
 def in_force(messages: Sequence[Message], name: str) -> float | None:
-    """The value of a setting of the filter that left this result; None if it does not say."""
+    """Returns the value of a setting of the filter of this result; None if it is not in it."""
     configs = [m for m in messages if isinstance(m, Config) and m.build_fingerprint]
     return configs[-1].settings.get(IDS[name]) if configs else None
 
 
 def mode_in_force(messages: Sequence[Message]) -> str:
-    """slam, mapping, localization or dead_reckoning; empty if the result does not say."""
+    """Returns slam, mapping, localization or dead_reckoning; empty if the result has none."""
     mode = in_force(messages, "mode")
     return "" if mode is None else word_of("mode", mode)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The small sensors, one row each: its name, its CSV file, what it would measure without noise.
+"""The table of small sensors: name, CSV file, and what each would measure without noise.
 
 `simulate` and `convert csv` make their options from this table. docs/ADD-A-SENSOR.md adds a row.
 """
@@ -19,7 +19,7 @@ from pelorus.se3 import Poses
 
 
 class Motion(NamedTuple):
-    """How the body truly moves, at some times: its poses, and the velocities from each time on."""
+    """The body's true motion at some times: its poses, and the velocities from each time on."""
 
     poses: Poses
     v_B_mps: Floats
@@ -31,19 +31,20 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class SmallSensor:
-    """A row. Its numbers are one to three, each with a letter by which the options name it."""
+    """A row of the table: one to three numbers, each with its letter in options."""
 
     name: str
     columns: Mapping[str, str]  # of its CSV file by letter; the word behind the last _ is the unit
-    sigma: tuple[float, ...]  # of each number, unless told otherwise
-    measure: Callable[[Motion, Floats], Floats]  # (n, numbers) without noise, sitting at an arm, m
-    usual: str = ""  # letters that are measured unless told otherwise; none: all
+    sigma: tuple[float, ...]  # default of each number
+    # (n, numbers) without noise, for a sensor at an arm, m
+    measure: Callable[[Motion, Floats], Floats]
+    usual: str = ""  # default letters that are measured; empty: all
     has_arm: bool = True  # where it sits on the body matters
-    at_rest: bool = False  # it says nothing but that the body rests: its numbers are zeros
+    at_rest: bool = False  # it reports only that the body rests: its numbers are zeros
 
     @property
     def number(self) -> int:
-        """In a READING."""
+        """Returns the number in a READING."""
         return schema.SENSORS[self.name]
 
     @property
@@ -51,16 +52,16 @@ class SmallSensor:
         return "".join(self.columns)
 
     def unit(self, letter: str) -> str:
-        """As a column's name ends: mps, m."""
+        """Returns the unit in a column's name: mps, m."""
         return self.columns[letter].rpartition("_")[2]
 
     def axes(self, letters: str) -> int:
-        """The bits of a READING."""
+        """Returns the bits of a READING."""
         return sum(1 << k for k, letter in enumerate(self.columns) if letter in letters)
 
 
 def name_of(number: int) -> str:
-    """What a READING's sensor is called; also that of a later version."""
+    """Returns the name of a READING's sensor; one of a later version has a name, too."""
     names = {row: name for name, row in schema.SENSORS.items()}
     return names.get(number, f"sensor {number}")
 
@@ -69,7 +70,7 @@ def name_of(number: int) -> str:
 
 
 def _wheel(motion: Motion, arm_m: Floats) -> Floats:
-    """v + w x l."""
+    """Returns v + w x l."""
     (x, y, z), (a, b, c) = motion.w_B_radps.T, arm_m
     turn: Floats = np.stack((y * c - z * b, z * a - x * c, x * b - y * a), axis=-1)
     return motion.v_B_mps + turn
@@ -80,7 +81,7 @@ def _nothing(motion: Motion, arm_m: Floats) -> Floats:  # noqa: ARG001
 
 
 def _position(motion: Motion, arm_m: Floats) -> Floats:
-    """p + R l."""
+    """Returns p + R l."""
     R, p = motion.poses
     arm: Floats = R[:, :, 0] * arm_m[0] + R[:, :, 1] * arm_m[1] + R[:, :, 2] * arm_m[2]
     return p + arm

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Stamps that a device's clock or driver spoilt, and what mends them.
+"""Repairs stamps that a device's clock or driver spoilt.
 
-A counter of 32 bits starts again at 0: its period is known, so its stamps are unwrapped. A driver
-that empties a sensor's buffer gives all readings of a batch one stamp, that of the last one: the
+A counter of 32 bits wraps to 0: its period is known, so its stamps are unwrapped. A driver that
+empties a sensor's buffer gives all readings of a batch one stamp, that of the last one: the
 readings are spread evenly over the time since the batch before.
 """
 
@@ -16,13 +16,13 @@ import numpy as np
 from pelorus.motion import Times
 
 BITS, UNITS_NS = (32, 24, 16), {"us": 1_000, "ms": 1_000_000, "ns": 1}
-STEPS_MAX = 10.0  # times the usual step, that the step across a wrap may have
-STEPS_LEAST = 1000  # usual steps of a period
-PAUSE = 5.0  # times the usual interval between batches: readings are not spread across a pause
+STEPS_MAX = 10.0  # ratio of the step across a wrap to the usual step
+STEPS_LEAST = 1000  # usual steps in a period
+PAUSE = 5.0  # ratio to the usual interval between batches: across a pause readings are not spread
 
 
 class Unwrapped(NamedTuple):
-    """Times that ascend, and how often which counter started again."""
+    """Ascending times, and how often which counter wrapped."""
 
     t_ns: Times
     wraps: int = 0
@@ -36,7 +36,7 @@ class Unwrapped(NamedTuple):
 
 
 def unwrapped(t_ns: Times) -> Unwrapped:
-    """Returns the times of a counter that starts again at 0, or the same times if none fits.
+    """Returns the times of a counter that wraps to 0, or the same times if none fits.
 
     Each step back must be the whole period less a usual step, which is a small part of the
     period: rows in no order of time are no counter.
@@ -58,7 +58,7 @@ def unwrapped(t_ns: Times) -> Unwrapped:
 
 
 class Spread(NamedTuple):
-    """Times one by one, and how many readings a batch had in the median."""
+    """Separate times, and the median number of readings in a batch."""
 
     t_ns: Times
     batch: int
@@ -72,7 +72,7 @@ def spread(t_ns: Times) -> Spread:
     """
     stamps, first, count = np.unique(t_ns, return_index=True, return_counts=True)
     usual = int(np.median(count)) if len(count) else 0
-    if len(stamps) < 2 or usual < 2:  # a stamp that stands twice by mistake makes no batches
+    if len(stamps) < 2 or usual < 2:  # a duplicate stamp makes no batches
         return Spread(t_ns, usual)
     gaps = np.diff(stamps).astype(np.float64)
     usual_ns = float(np.median(gaps / count[1:]))  # of a reading

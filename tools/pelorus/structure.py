@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How a struct of the library in C shows itself in Python."""
+"""The Python form of a struct of the C library."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ S = TypeVar("S", bound=c.Structure)
 
 
 class Struct(c.Structure):
-    """One of include/pelorus; its `_fields_` are the header's, in their order."""
+    """A struct of include/pelorus; its `_fields_` are the header's, in their order."""
 
     c_name: ClassVar[str]
 
     def __repr__(self) -> str:
         names = (field[0] for field in self._fields_)
-        told = (f"{name}={_told(name, getattr(self, name))}" for name in names)
-        return f"{type(self).__name__}({', '.join(told)})"
+        members = (f"{name}={_member_words(name, getattr(self, name))}" for name in names)
+        return f"{type(self).__name__}({', '.join(members)})"
 
 
-def _told(name: str, value: Any) -> str:
-    """A member, as a struct shows itself."""
+def _member_words(name: str, value: Any) -> str:
+    """Returns a member as in a struct's repr."""
     if name == "health":
         return schema.HEALTHS.get(value, str(value))
     if isinstance(value, Reason):
@@ -35,7 +35,7 @@ def _told(name: str, value: Any) -> str:
 
 
 def with_reasons(struct: type[S]) -> type[S]:
-    """The class, with `reasons` a Reason; the library's number stays where it is."""
+    """Returns the class with `reasons` as a Reason; the library's number stays."""
     bits: Any = vars(struct)["reasons"]
     setattr(struct, "reasons", property(lambda own: Reason(bits.__get__(own))))  # noqa: B010
     return struct

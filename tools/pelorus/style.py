@@ -41,7 +41,7 @@ LOOK: Any = {
 
 
 class Pen(NamedTuple):
-    """How a run is drawn; the dashes tell the runs apart without any colour."""
+    """A run's line style; the dashes distinguish runs without any colour."""
 
     colour: str
     dashes: str | tuple[int, tuple[float, ...]]
@@ -68,18 +68,18 @@ TRUTH = Pen(BLACK, (0, (2.5, 1.5)), "truth", 8)
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
-    """A figure that lays itself out, outside pyplot's global state."""
+    """Returns a figure with automatic layout, outside pyplot's global state."""
     return Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
 
 
 def panel(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Axes at a place in inches, where a picture needs its shape to be known."""
+    """Returns axes at a place in inches, where a picture needs a known shape."""
     across, up = figure.get_size_inches()
     return figure.add_axes((left / across, bottom / up, width / across, height / up))
 
 
 def limit_decades(axes: Axes) -> None:
-    """A logarithmic scale whose foot is not given away to the few smallest values of a curve."""
+    """Limits a logarithmic scale, so that the few smallest values of a curve do not stretch it."""
     curves = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
     feet = [np.percentile(y[y > 0], FOOT_PERCENT) for y in curves if (y > 0).any()]
     axes.set_yscale("log")
@@ -88,12 +88,12 @@ def limit_decades(axes: Axes) -> None:
 
 
 def legend_above(figure: Figure, axes: Axes, columns: int = 6, markers: float = 1.0) -> None:
-    """One row over the panels, where it covers no data."""
+    """Draws the legend in one row above the panels, where it covers no data."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, markerscale=markers)
 
 
 def save(draw: Callable[[], Figure], path: Path) -> None:
-    """Draw and write a PNG."""
+    """Draws and writes a PNG."""
     with writing(path), rc_context(LOOK):
         draw().savefig(path, format="png")

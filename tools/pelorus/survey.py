@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a recording holds, counted: the numbers behind `pelorus info`."""
+"""Counts the content of a recording: the numbers behind `pelorus info`."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from pelorus.inertial_survey import ImuSurvey
 from pelorus.small_sensors import name_of
 from pelorus.wire import Counts, Received
 
-SAME_MOST = 10  # successive readings of the same numbers, as the filter allows
+SAME_MOST = 10  # identical successive readings that the filter allows
 GRAVITY_OFF_MPS2 = 1.0
-GAP_RATIO = 1.5  # an interval is a gap if it exceeds the median one so much
+GAP_RATIO = 1.5  # an interval that exceeds the median one by this ratio is a gap
 DATA = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.POSE)
 
 
@@ -57,23 +57,23 @@ class Stream:
 
 
 @dataclass(frozen=True)
-class Tracks:
+class TrackSurvey:
     """Observations of all STEREO frames."""
 
     observations: int
     per_frame: tuple[int, int, int]  # least, median, most
     landmarks: int
     frames_per_landmark: float  # median
-    no_disparity: int  # uL <= uR: no point of the world
+    no_disparity: int  # uL <= uR: behind infinity
 
 
 @dataclass(frozen=True)
-class SmallSensor:
+class SensorSurvey:
     """The READINGs of one sensor."""
 
     stream: Stream
     axes: int  # bits: all that were measured at any time
-    sigma: tuple[float, ...]  # median of each that was
+    sigma: tuple[float, ...]  # median of each measured number
 
 
 @dataclass(frozen=True)
@@ -87,29 +87,29 @@ class Survey:
     landmarks: dict[str, int]  # by role
     texts: list[Text]
     streams: dict[Kind, Stream]
-    sensors: dict[str, SmallSensor]
-    calibrated: Calibrated | None  # as a filter's result says last
+    sensors: dict[str, SensorSurvey]
+    calibrated: Calibrated | None  # a filter's last estimate
     imu: ImuSurvey | None
-    tracks: Tracks | None
+    tracks: TrackSurvey | None
     end: End | None
     health: TimeLine | None = None  # of a result
     remarks: list[str] = field(default_factory=list)
 
     @property
     def origin_ns(self) -> int:
-        """The first time of any stream: time 0 of what is shown."""
+        """Returns the first time of any stream, which is time 0 in the output."""
         sensors = (sensor.stream for sensor in self.sensors.values())
         streams = (*self.streams.values(), *sensors)
         return min((stream.first_ns for stream in streams), default=0)
 
     @property
     def useful(self) -> bool:
-        """A header, and something to which it applies."""
+        """Returns whether there is a header, and data to which it applies."""
         return self.header is not None and bool(self.streams or self.sensors)
 
 
 def survey(path: Path) -> Survey:
-    """Read a recording, damaged or not. PelorusError where not one frame can be read."""
+    """Reads a recording, damaged or not; raises PelorusError where not one frame can be read."""
     received, counts = wire.read_file(path)
     messages = [frame.message for frame in received]
     header = next((m for m in messages if isinstance(m, Header)), None)
@@ -141,14 +141,14 @@ def survey(path: Path) -> Survey:
     return found
 
 
-def _sensors(readings: list[Reading]) -> dict[str, SmallSensor]:
-    """By name, in the order of their numbers."""
+def _sensors(readings: list[Reading]) -> dict[str, SensorSurvey]:
+    """Returns the sensors by name, in the order of their numbers."""
     found = {}
     for number in sorted({m.sensor for m in readings}):
         own = [m for m in readings if m.sensor == number]
         has = np.array([[m.axes >> k & 1 for k in range(3)] for m in own], bool)
         sigma = np.array([m.sigma for m in own])
-        found[name_of(number)] = SmallSensor(
+        found[name_of(number)] = SensorSurvey(
             _stream(_times(own), ties=True),
             int(np.bitwise_or.reduce([m.axes for m in own])),
             tuple(float(np.median(sigma[has[:, k], k])) for k in range(3) if has[:, k].any()),
@@ -157,7 +157,7 @@ def _sensors(readings: list[Reading]) -> dict[str, SmallSensor]:
 
 
 def _times(messages: Sequence[Message]) -> list[int]:
-    """Of each message, or of each reading of an IMU."""
+    """Returns the time of each message, or of each reading of an IMU."""
     return [
         int(t)
         for m in messages
@@ -166,7 +166,7 @@ def _times(messages: Sequence[Message]) -> list[int]:
 
 
 def _stream(exact: Sequence[int], ties: bool = False) -> Stream:
-    """`ties`: at one time there may be several."""
+    """Returns a stream's figures; with `ties` several messages may have one time."""
     steps = np.diff(np.array(exact, np.float64))
     ahead = steps[steps > 0]
     usual = float(np.median(ahead)) if len(ahead) else 0.0
@@ -181,14 +181,14 @@ def _stream(exact: Sequence[int], ties: bool = False) -> Stream:
     )
 
 
-def _tracks(stereos: list[Stereo]) -> Tracks:
+def _tracks(stereos: list[Stereo]) -> TrackSurvey:
     per_frame = np.array([len(m.ids) for m in stereos])
     ids = np.concatenate([m.ids for m in stereos])
     pixels = np.concatenate([m.pixels for m in stereos])
     _, seen = np.unique(ids, return_counts=True)
     with np.errstate(invalid="ignore"):
         no_disparity = int(np.sum(~(pixels[:, 0] > pixels[:, 2])))
-    return Tracks(
+    return TrackSurvey(
         observations=len(ids),
         per_frame=(int(per_frame.min()), int(np.median(per_frame)), int(per_frame.max())),
         landmarks=len(seen),
@@ -198,7 +198,7 @@ def _tracks(stereos: list[Stereo]) -> Tracks:
 
 
 def _remarks(found: Survey, received: list[Received]) -> list[str]:
-    """What a reader of the recording should know."""
+    """Returns remarks for a reader of the recording."""
     said = []
     if found.header is None:
         said.append("there is no HEADER: without the calibration nothing can be replayed")
@@ -248,13 +248,13 @@ def _end_differences(end: End, counts: Counts) -> list[str]:
         Kind.IMU: end.imus,
     }
     return [
-        f"END tells of {due} {kind.name} frames, {counts.frames[kind]} can be read"
-        for kind, due in told.items()
-        if due != counts.frames[kind]
+        f"END tells of {expected} {kind.name} frames, {counts.frames[kind]} can be read"
+        for kind, expected in told.items()
+        if expected != counts.frames[kind]
     ]
 
 
 def require_useful(found: Survey) -> None:
-    """Raise where nothing in the recording can be used."""
+    """Raises PelorusError where nothing in the recording can be used."""
     if not found.useful:
         raise PelorusError(f"{found.path}: nothing useful in it: {'; '.join(found.remarks)}")

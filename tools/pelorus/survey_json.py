@@ -17,7 +17,7 @@ from pelorus.survey import Stream, Survey
 
 
 def of(found: Survey) -> dict[str, Any]:
-    """Everything that `info` shows; null where there is nothing."""
+    """Returns everything that `info` shows; null where there is nothing."""
     origin = found.origin_ns
     counts = found.counts
     config = found.configs[-1] if found.configs else None
@@ -116,5 +116,5 @@ def _seconds(ns: int) -> float:
 
 
 def _number(value: float) -> float | None:
-    """JSON knows neither NaN nor infinity."""
+    """Returns null for NaN and infinity, which JSON does not have."""
     return value if np.isfinite(value) else None

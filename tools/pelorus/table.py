@@ -15,9 +15,9 @@ from pelorus import arrays, foreign, stamps
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 
-DIGITS_MAX = 19  # 2^63 has as many
+DIGITS_MAX = 19  # digits of 2^63
 SHOWN_MAX = 40
-WHOLE = re.compile(r"(?<=\d)\.0*$")  # behind a whole number: pandas writes 3.0
+WHOLE = re.compile(r"(?<=\d)\.0*$")  # after a whole number, as pandas writes 3.0
 TIME_UNITS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}  # a column t_ms and so on; in ns
 PLAIN_TIME = "t"
 TIME_COLUMNS = [f"t_{unit}" for unit in TIME_UNITS]
@@ -28,18 +28,16 @@ class Table:
 
     def __init__(self, path: Path, columns: dict[str, list[str]], first_row: int = 2) -> None:
         self.path = path
-        self.first_row = first_row  # of the numbers, counted as messages do: from 1
+        self.first_row = first_row  # as in messages: the file's first line is 1
         self.rows = np.arange(first_row, first_row + len(next(iter(columns.values()), [])))
-        self.remarks: list[str] = []  # what is to be said of how the file was read
+        self.remarks: list[str] = []  # on how the file was read
         self._taken: dict[str, list[str]] = {}  # of them, by unit
         self.plain: Mapping[str, tuple[str, str]] = {}  # by column, its name without unit; a unit
         self._columns = columns
         self._factor: dict[str, float] = {}
-        self._own: dict[str, str] = {}  # what a renamed column is called in the file
-        self.hint_of: Callable[[str, list[str]], str] | None = (
-            None  # what to do about a column that lacks
-        )
-        self._missed: dict[str, str] = {}  # the names that another column should have had
+        self._own: dict[str, str] = {}  # a renamed column's name in the file
+        self.hint_of: Callable[[str, list[str]], str] | None = None  # advice about a missing column
+        self._missed: dict[str, str] = {}  # names that other columns should have been given
 
     @classmethod
     def read(cls, path: Path) -> Table:
@@ -57,15 +55,15 @@ class Table:
 
     @property
     def count(self) -> int:
-        """Of the rows."""
+        """Returns the number of rows."""
         return len(next(iter(self._columns.values())))
 
     def row(self, k: int) -> str:
-        """Where the k-th row of numbers stands in the file."""
+        """Returns the k-th row's place in the file."""
         return f"row {self.rows[k]}"
 
     def rename(self, column: str, name: str, factor: float) -> None:
-        """Give a column another name; its numbers are `factor` times what stands there."""
+        """Renames a column, and multiplies its numbers by `factor`."""
         if name != column and name in self._columns:
             raise ForeignFileError(
                 self.path, f"has the column {name}, and {column} is to be called so", at="row 1"
@@ -75,12 +73,14 @@ class Table:
         self._own[name] = column
 
     def put(self, name: str, numbers: Floats) -> None:
-        """Give the table one more column."""
+        """Adds a column."""
         self._columns[name] = [repr(number) for number in numbers.tolist()]
 
     def leave_out_bad(self, *names: str, each_time_once: bool = True) -> None:
-        """Without the few rows in which a number of these columns is missing or not finite, or
-        time was never set, or repeats; ForeignFileError where they are many.
+        """Leaves out the few rows whose numbers in these columns are missing or not finite.
+
+        Rows whose time was never set, or repeats, go too. Raises ForeignFileError where they are
+        many.
         """
         for name in filter(self.has, (self._time_column(), *names)):
             wrong = np.array([_is_none(cell) for cell in self._columns[name]], np.bool_)
@@ -93,9 +93,9 @@ class Table:
             self._leave_out(again, "time does not ascend but repeats")
 
     def _spread_batches(self) -> None:
-        """Give readings that share stamps, as a driver gives them to a batch, times of their own.
+        """Gives readings times of their own where a driver gives a batch one stamp.
 
-        Rows that stand twice are no batch.
+        Duplicate rows are no batch.
         """
         if not self._share_times(self.times()):
             return
@@ -117,28 +117,28 @@ class Table:
 
     @staticmethod
     def _share_times(t_ns: NDArray[np.int64]) -> bool:
-        """Whether so many rows repeat the time before that it is a driver's habit."""
+        """Returns whether enough rows repeat the time before for a driver's habit."""
         steps = np.diff(t_ns)
         return bool((steps == 0).sum() > foreign.BAD_ROWS_MAX * len(t_ns) and (steps >= 0).all())
 
     def keep(self, good: NDArray[np.bool_]) -> None:
-        """Keep these rows alone."""
+        """Keeps only these rows."""
         kept = np.nonzero(good)[0].tolist()
         self.rows = self.rows[good]
         self._columns = {n: [column[k] for k in kept] for n, column in self._columns.items()}
 
     def cells(self, name: str) -> list[str]:
-        """Of a column, as they stand."""
+        """Returns the cells of a column as they are."""
         return self._columns[name]
 
     @property
     def has_times(self) -> bool:
-        """Whether some column holds times that can be read."""
+        """Returns whether some column holds readable times."""
         name = self._time_column()
         return self.has(name) and not any(map(_is_none, self._columns[name]))
 
     def is_numeric(self, name: str) -> bool:
-        """Whether every cell of a column is a number."""
+        """Returns whether every cell of a column is a number."""
         return all(map(foreign.is_number, self._columns[name]))
 
     def _leave_out(self, wrong: NDArray[np.bool_], what: str) -> None:
@@ -147,11 +147,11 @@ class Table:
             self.keep(~wrong)
 
     def miss(self, column: str, name: str) -> None:
-        """`column`, which is not here, should have been renamed."""
+        """Records that `column`, which is missing here, should have been renamed."""
         self._missed[name] = column
 
     def require(self, *names: str) -> None:
-        """Refuse a file without these columns."""
+        """Refuses a file without these columns."""
         lacking = [name for name in names if not self.has(name)]
         if lacking:
             there = ", ".join(self._called(name) for name in self._columns)
@@ -161,16 +161,16 @@ class Table:
             raise ForeignFileError(
                 self.path,
                 f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}",
-                due=f"there are: {there}{hint}",
+                expected=f"there are: {there}{hint}",
             )
 
     def numbers(self, *names: str) -> Floats:
-        """(rows, len(names)) finite float64."""
+        """Returns (rows, len(names)) finite float64."""
         self.require(*names)
         return np.stack([self._column(name) for name in names], axis=-1)
 
     def integers(self, name: str, highest: int) -> NDArray[np.int64]:
-        """Whole numbers from 0 to `highest`, exact beyond 2^53."""
+        """Returns whole numbers from 0 to `highest`, exact beyond 2^53."""
         self.require(name)
         out = np.empty(len(self._columns[name]), np.int64)
         for row, cell in enumerate(self._columns[name]):
@@ -186,7 +186,7 @@ class Table:
         return out
 
     def has(self, name: str) -> bool:
-        """Under its name, or under the plain one without a unit, which is then told."""
+        """Returns whether a column exists; a plain name without a unit adds a remark."""
         if name in self._columns:
             return True
         short, unit = self.plain.get(name, ("", ""))
@@ -213,12 +213,12 @@ class Table:
         )
 
     def words(self, name: str) -> list[str]:
-        """The cells of a column, without the blanks around them."""
+        """Returns the cells of a column, without blanks around them."""
         self.require(name)
         return [cell.strip() for cell in self._columns[name]]
 
     def times(self) -> NDArray[np.int64]:
-        """ns from the column t_ns, t_us, t_ms or t_s; not yet checked to ascend."""
+        """Returns ns from the column t_ns, t_us, t_ms or t_s; not yet checked to ascend."""
         name = self._time_column()
         unit = name[2:]
         if unit == "ns":
@@ -237,7 +237,7 @@ class Table:
         return found.t_ns
 
     def _time_column(self) -> str:
-        """t_ns and such, t_s if there is none; t is one of them: its numbers are s or ns."""
+        """Returns the existing one of t_ns, t_us ..., else t_s; plain t is s or ns by its size."""
         known = [*self._columns, *self._missed]
         found = next((name for name in known if name in TIME_COLUMNS), "")
         if found or not self.plain or PLAIN_TIME not in self._columns:
@@ -249,7 +249,7 @@ class Table:
         return f"t_{unit}"
 
     def _exact_ns(self, name: str, factor: float) -> NDArray[np.int64]:
-        """As decimals: a double would round today's clock to 0.2 microseconds."""
+        """Parses decimals: a double would round today's clock to 0.2 microseconds."""
         exact = (Decimal(cell.strip()) * int(factor) for cell in self._columns[name])
         return np.array([int(t.to_integral_value()) for t in exact], np.int64)
 
@@ -265,7 +265,7 @@ class Table:
         return t_ns
 
     def _called(self, name: str) -> str:
-        """As the file has it, for its owner to find."""
+        """Returns the column's name in the file, for its owner."""
         return self._own.get(name, name)
 
     def _column(self, name: str) -> Floats:
@@ -291,7 +291,7 @@ class Table:
 
 
 def _is_none(cell: str) -> bool:
-    """Nothing, or what programs write for a number that is none."""
+    """Returns whether a cell is empty, or a program's word for a missing number."""
     return cell.strip().lstrip("+-").lower() in ("", "nan", "inf", "infinity")
 
 

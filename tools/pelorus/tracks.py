@@ -16,11 +16,11 @@ from pelorus.layout import Floats
 
 Indices = NDArray[np.intp]
 
-ABSENT = -1.0  # all four numbers of a landmark that a frame does not show
+ABSENT = -1.0  # all four numbers of a landmark that is not in the frame
 
 
 def project(camera: Camera, q_C: Floats) -> Floats:
-    """Points in the left camera (n, 3), m -> (n, 4) px: uL vL uR vR. Depth must be positive."""
+    """Projects points in the left camera (n, 3), m, depth > 0, to (n, 4) px: uL vL uR vR."""
     x, y, z = q_C.T
     v = camera.fy_px * y / z + camera.cy_px
     u_left = camera.fx_px * x / z + camera.cx_px
@@ -28,7 +28,7 @@ def project(camera: Camera, q_C: Floats) -> Floats:
 
 
 def point_jacobian(camera: Camera, q: Floats) -> Floats:
-    """d project / d q, (n, 4, 3)."""
+    """Returns d project / d q, (n, 4, 3)."""
     x, y, z = q.T
     D = np.zeros((len(q), 4, 3))
     D[:, 0, 0] = D[:, 2, 0] = camera.fx_px / z
@@ -40,7 +40,7 @@ def point_jacobian(camera: Camera, q: Floats) -> Floats:
 
 
 def sum_by_frame(frame: Indices, count: int, values: Floats) -> Floats:
-    """(count, ...): of values (n, ...) that stand by ascending frame."""
+    """Returns sums (count, ...) of values (n, ...), which are sorted by frame."""
     counts = np.bincount(frame, minlength=count)
     out = np.zeros((count, *values.shape[1:]))
     if len(values):
@@ -51,7 +51,7 @@ def sum_by_frame(frame: Indices, count: int, values: Floats) -> Floats:
 
 
 def triangulate(camera: Camera, pixels: Floats) -> Floats:
-    """(n, 4) px with positive disparity -> points in the left camera (n, 3), m."""
+    """Maps (n, 4) px with positive disparity to points in the left camera (n, 3), m."""
     u_left, v_left, u_right, v_right = pixels.T
     scale = camera.baseline_m / (u_left - u_right)
     y = (0.5 * (v_left + v_right) - camera.cy_px) * scale * camera.fx_px / camera.fy_px
@@ -59,7 +59,7 @@ def triangulate(camera: Camera, pixels: Floats) -> Floats:
 
 
 class Pairs(NamedTuple):
-    """The same landmark in frames k and k + lag: `first` and `second` are rows of Tracks."""
+    """Pairs of a landmark in frames k and k + lag: `first` and `second` are rows of Tracks."""
 
     frame: Indices  # k of each pair, ascending
     first: Indices
@@ -84,7 +84,7 @@ class Tracks:
 
     @classmethod
     def from_dense(cls, features: Floats) -> Tracks:
-        """(4, M, T): M landmarks in T frames, all four -1 where absent; the id is the column."""
+        """Reads (4, M, T): M landmarks in T frames, -1 where absent; the id is the column."""
         seen = ~(features == ABSENT).all(axis=0)
         frame, id = np.nonzero(seen.T)
         return cls(features.shape[2], frame, id.astype(np.int64), features[:, id, frame].T)
@@ -96,15 +96,15 @@ class Tracks:
         return self.from_rows(self.frame_count, self.frame, id, self.pixels)
 
     def counts(self) -> NDArray[np.int64]:
-        """Observations of each frame."""
+        """Returns the number of observations of each frame."""
         return np.bincount(self.frame, minlength=self.frame_count)
 
     def bounds(self) -> NDArray[np.int64]:
-        """Frame k has the rows bounds[k] to bounds[k + 1]."""
+        """Returns bounds: frame k has the rows bounds[k] to bounds[k + 1]."""
         return np.concatenate(([0], np.cumsum(self.counts())))
 
     def pairs(self, lag: int) -> Pairs:
-        """All landmarks that are seen in frame k and, under the same id, in frame k + lag."""
+        """Returns all landmarks that are in frame k and, under the same id, in frame k + lag."""
         stride = np.int64(self.id.max() + 1) if len(self) else np.int64(1)
         key = self.frame * stride + self.id
         wanted = key + lag * stride
@@ -114,7 +114,7 @@ class Tracks:
         return Pairs(self.frame[first], first, at[first])
 
     def check(self, source: Path) -> None:
-        """Refuse what no recording can hold."""
+        """Refuses what no recording can hold."""
         if not len(self):
             raise ForeignFileError(source, "holds no observation at all")
         if not np.isfinite(self.pixels).all():
@@ -129,5 +129,5 @@ class Tracks:
             raise ForeignFileError(
                 source,
                 f"a frame has {fullest} observations",
-                due=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
+                expected=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
             )

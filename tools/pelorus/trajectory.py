@@ -32,16 +32,16 @@ from pelorus.se3 import Poses
 POSE_SIZE = 6
 POSE_COLUMNS = 8  # t x y z, a quaternion
 KITTI_COLUMNS = 12
-EUROC_COLUMNS = 17  # velocity and biases stand behind; w is first, whatever parts them
+EUROC_COLUMNS = 17  # velocity and biases follow; w is first, whatever the separator
 QUATERNION_NORM_TOLERANCE = 1e-2
-TRUTH_GAP_NS = 250_000_000  # between poses so far apart none is made up
+TRUTH_GAP_NS = 250_000_000  # no pose is interpolated across a longer gap
 POSITION_NAME = r"(t|p|p_\w+)?_?[xyz]( \[m\])?"
 QUATERNION_NAME = r"q\w*?_?([xyzw])( \[\])?"
 CELL_SHOWN = 40  # characters of a bad one
 
 
 class Trajectory(NamedTuple):
-    """Body poses at ascending times; `remarks` say how a file was read, and what was left out."""
+    """Body poses at ascending times; `remarks` are on what was read, and left out."""
 
     t_ns: Times
     poses: Poses
@@ -49,7 +49,7 @@ class Trajectory(NamedTuple):
 
 
 def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
-    """The same, and one at each wanted time between poses that are near enough in time."""
+    """Returns the trajectory with a pose at each wanted time between close enough ones."""
     t_ns = whole.t_ns
     lacking = np.setdiff1d(wanted_t_ns, t_ns)
     lacking = lacking[(lacking > t_ns[0]) & (lacking < t_ns[-1])]
@@ -69,7 +69,7 @@ def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
 
 
 def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
-    """A text file of poses; the times' unit, if it is not said, is told by their size and steps."""
+    """Reads a text file of poses; by default the times' size and steps give their unit."""
     file = foreign.written(path)
     sound = foreign.sound(path, file.rows, used=POSE_COLUMNS)
     columns = sound.numbers.shape[1]
@@ -78,7 +78,7 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
             path,
             f"has {columns} numbers",
             at=f"line {sound.rows[0].line}",
-            due=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
+            expected=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
         )
     if in_ns is None:
         in_ns = arrays.are_ns(sound.numbers[:, 0])
@@ -101,7 +101,7 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
 
 
 def names_poses(names: list[str]) -> bool:
-    """Whether columns are called as in such files: tx, p_RS_R_y [m], z, qw and the like."""
+    """Returns whether columns are named as in such files: tx, p_RS_R_y [m], z, qw and the like."""
     bare = [name.lower() for name in names]
     positions = [name for name in bare if re.fullmatch(POSITION_NAME, name)]
     quaternions = [name for name in bare if re.fullmatch(QUATERNION_NAME, name)]
@@ -109,7 +109,7 @@ def names_poses(names: list[str]) -> bool:
 
 
 def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
-    """Where position and quaternion begin, and its order: q_RS_w [], qx, q_z and such are known."""
+    """Returns where position and quaternion begin, and its order: q_RS_w [], qx, q_z and such."""
     at: dict[str, int] = {}
     for k, name in enumerate(names):
         found = re.fullmatch(QUATERNION_NAME, name.lower())
@@ -123,7 +123,7 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
         raise ForeignFileError(
             path,
             f"names the columns {', '.join(names[:POSE_COLUMNS])}",
-            due="time, position and quaternion (x y z w, or w first) are expected, in that "
+            expected="time, position and quaternion (x y z w, or w first) are expected, in that "
             "order or "
             "the quaternion before the position",
         )
@@ -133,7 +133,7 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
 def ascending(
     path: Path, rows: list[Row], t_ns: Times
 ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Which rows have a time of their own, and what to say of the others."""
+    """Returns which rows have a time of their own, and remarks on the others."""
 
     def at(k: int) -> str:
         return f"line {rows[k].line}"
@@ -152,17 +152,17 @@ def ascending(
 
 
 def _turned(path: Path, rows: list[Row], q: Floats) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Which quaternions are rotations, and what to say of the other rows."""
+    """Returns which quaternions are rotations, and remarks on the other rows."""
     wrong = np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1) > QUATERNION_NORM_TOLERANCE, np.bool_)
     what = "the quaternion's norm is not 1"
     return ~wrong, foreign.left_out(path, wrong, lambda k: f"line {rows[k].line}", what)
 
 
 def read_truth(path: Path, times: Path | None = None, recording: Path | None = None) -> Trajectory:
-    """A reference: a recording with TRUTH, a TUM file, EuRoC's, or KITTI poses.
+    """Reads a reference: a recording with TRUTH, a TUM file, EuRoC's, or KITTI poses.
 
     KITTI poses need times: a file with one time in seconds a row, or the recording, whose frame k
-    row k belongs to; with the recording they are brought from the camera to the body.
+    row k belongs to; with the recording they are moved from the camera to the body.
     """
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
@@ -175,13 +175,13 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
         raise ForeignFileError(
             path,
             f"rows of {columns} numbers",
-            due=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
+            expected=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
         )
     return read_stamped(path)
 
 
 def truth_of(path: Path) -> Trajectory:
-    """TRUTH at the times of STEREO, where the figures are evaluated."""
+    """Returns the TRUTH at the times of STEREO, where the figures are evaluated."""
     messages = wire.messages_of(path)
     found = truth_in(messages)
     if found is not None:
@@ -192,10 +192,10 @@ def truth_of(path: Path) -> Trajectory:
 
 
 def truth_in(messages: Sequence[Message]) -> Trajectory | None:
-    """TRUTH at the times of STEREO; of two at one time the later, and none that is not finite.
+    """Returns the TRUTH at the times of STEREO; of two at one time the later, and finite ones only.
 
     All of it where none has such a time: then the camera has a clock of its own, and the filter's
-    poses have the other one (setting camera-offset).
+    poses are on the other one (setting camera-offset).
     """
     frames = _frame_times(messages)
     whole = {m.t_ns: m for m in messages if isinstance(m, Truth)}
@@ -205,14 +205,12 @@ def truth_in(messages: Sequence[Message]) -> Trajectory | None:
 
 
 def is_finite(pose: Pose | Truth) -> bool:
-    """Whether it is one."""
+    """Returns whether all its numbers are finite."""
     return bool(np.isfinite(pose.R_WB).all() and np.isfinite(pose.p_WB_m).all())
 
 
 def estimate_in(messages: Sequence[Message]) -> tuple[Trajectory, Floats] | None:
-    """A filter's poses after STEREO that are finite, with their covariance (n, 6, 6), NaN where it
-    knows none.
-    """
+    """Returns a filter's finite poses after STEREO, and covariances (n, 6, 6), NaN if unknown."""
     found = (m for m in messages if isinstance(m, Pose) and m.after_stereo)
     poses = {m.t_ns: m for m in found if is_finite(m)}
     if not poses:
@@ -234,7 +232,7 @@ def _ordered(poses: Sequence[Truth | Pose]) -> Trajectory:
 
 
 def read_kitti(path: Path) -> Poses:
-    """C_k, left camera k to world: a row of 12 numbers each, [R | p] row by row.
+    """Reads C_k, left camera k to world: a row of 12 numbers each, [R | p] row by row.
 
     Rotations are re-orthonormalised: the files hold 7 digits.
     """
@@ -244,7 +242,7 @@ def read_kitti(path: Path) -> Poses:
             path,
             f"has {len(rows[0].cells)} cells",
             at=f"line {rows[0].line}",
-            due=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
+            expected=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
         )
     numbers = foreign.numbers(path, rows, KITTI_COLUMNS)
     matrices = numbers.reshape(-1, 3, 4)
@@ -253,13 +251,13 @@ def read_kitti(path: Path) -> Poses:
     if off.max() > 1e-2:
         at = f"line {rows[int(off.argmax())].line}"
         raise ForeignFileError(
-            path, "holds no rotation", at=at, due="[R | p] is expected, row by row"
+            path, "holds no rotation", at=at, expected="[R | p] is expected, row by row"
         )
     return Poses(se3.nearest_rotation(R), matrices[:, :, 3])
 
 
 def body_poses(camera_poses: Poses, T_CB: Poses) -> Poses:
-    """T_k = T_CB^-1 C_0^-1 C_k T_CB: the body's poses, the first one is the origin."""
+    """Returns T_k = T_CB^-1 C_0^-1 C_k T_CB: the body's poses, the first one is the origin."""
     from_first = se3.compose(se3.inverse(camera_poses.at(0)), camera_poses)
     return se3.compose(se3.compose(se3.inverse(T_CB), from_first), T_CB)
 
@@ -277,7 +275,7 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
         whose = times
     else:
         raise ForeignFileError(
-            path, "KITTI poses carry no times", due="give --recording or --times"
+            path, "KITTI poses carry no times", expected="give --recording or --times"
         )
     if len(poses.p) > len(t_ns):
         raise ForeignFileError(path, f"{len(poses.p)} poses, but {whose} has {len(t_ns)} times")
@@ -289,13 +287,13 @@ def _frame_times(messages: Sequence[Message]) -> set[int]:
 
 
 def is_recording(path: Path) -> bool:
-    """A text has no zero byte; a recording has one behind each frame."""
+    """Returns whether it has a zero byte: a recording has one after each frame, a text none."""
     beginning = foreign.beginning(path)
     return path.suffix == ".plr" or beginning.startswith(packed_file.MAGIC) or b"\0" in beginning
 
 
 def times_of(path: Path, rows: list[Row], in_ns: bool = False) -> Times:
-    """The first cells, s or ns, read as decimals: a double would round today's clock."""
+    """Returns the first cells, s or ns, parsed as decimals: a double would round today's clock."""
     return np.array([_nanoseconds(path, line, cells[0], in_ns) for line, cells in rows], np.int64)
 
 

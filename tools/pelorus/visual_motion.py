@@ -21,7 +21,7 @@ from pelorus.se3 import Poses
 from pelorus.second_view import NOISE, apply, inverse, linearised, measured, product
 from pelorus.tracks import Indices, Tracks, project, sum_by_frame, triangulate
 
-DISPARITY_MIN_PX = 1.0  # below it a triangulated depth means little
+DISPARITY_MIN_PX = 1.0  # below it a triangulated depth is worthless
 ROW_GAP_MAX_PX = 2.0  # a rectified pair shows a point in one row; more is a bad match
 DEPTH_MIN_M = 0.5
 PAIRS_MIN = 10  # with fewer a motion is not trusted
@@ -48,7 +48,7 @@ class SeenPairs:
         return np.bincount(self.frame, minlength=self.frame_count)
 
     def reproject(self, camera: Camera, motion: Poses) -> Floats:
-        """RMS over the four pixel numbers of each pair, px; infinite behind the camera."""
+        """Returns the RMS over each pair's four pixel numbers; infinite behind the camera."""
         q = np.einsum("nij,nj->ni", motion.R[self.frame], self.q_C) + motion.p[self.frame]
         ahead = q[:, 2] > DEPTH_MIN_M
         error = np.full(len(q), np.inf)
@@ -57,7 +57,7 @@ class SeenPairs:
         return error
 
     def median_by_frame(self, values: Floats, at_least: int = PAIRS_MIN) -> Floats:
-        """(frame_count,): the median of each frame's values, NaN with fewer than `at_least`."""
+        """Returns (frame_count,) each frame's median, NaN with fewer than `at_least`."""
         order = np.lexsort((values, self.frame))
         counts = self.counts()
         middle = np.concatenate(([0], np.cumsum(counts)[:-1])) + counts // 2
@@ -68,7 +68,7 @@ class SeenPairs:
 
 
 def seen_pairs(tracks: Tracks, camera: Camera, lag: int) -> SeenPairs:
-    """The pairs whose first pixels give a depth and whose rows agree."""
+    """Returns the pairs whose first pixels give a depth and whose rows agree."""
     pairs = tracks.pairs(lag)
     first, second = tracks.pixels[pairs.first], tracks.pixels[pairs.second]
     good = (
@@ -88,8 +88,9 @@ def seen_pairs(tracks: Tracks, camera: Camera, lag: int) -> SeenPairs:
 
 
 def estimate(seen: SeenPairs, camera: Camera, first: Poses | None = None) -> Poses:
-    """For each k the motion that brings coordinates in camera k to camera k + lag. The search
-    begins at rest, or with `first`: it finds what lies within some tens of pixels.
+    """Returns for each k the motion that maps coordinates in camera k to camera k + lag.
+
+    The search begins at rest, or with `first`; it converges from within some tens of pixels.
     """
     at_rest = Poses(np.tile(np.eye(3), (seen.frame_count, 1, 1)), np.zeros((seen.frame_count, 3)))
     motion = at_rest if first is None else first
@@ -101,13 +102,15 @@ def estimate(seen: SeenPairs, camera: Camera, first: Poses | None = None) -> Pos
 
 
 def rigid(seen: SeenPairs, camera: Camera) -> Poses:
-    """For each k the motion that fits the points in space, roughly: where to begin a search that
-    may have to go far. Points weigh by the square of their disparity, and less the less they fit.
+    """Returns for each k the motion that roughly fits the points in space, as a start for large
+    motions.
+
+    Points weigh by the square of their disparity, and less the less they fit.
     """
     u_left, u_right = seen.pixels[:, 0], seen.pixels[:, 2]
     here, there = seen.q_C, triangulate(camera, seen.pixels)
     sure = (np.minimum(seen.first_pixels[:, 0] - seen.first_pixels[:, 2], u_left - u_right)) ** 2
-    # what one pixel of disparity makes of a depth
+    # error of a depth by one pixel of disparity
     blur_m = here[:, 2] ** 2 / (camera.fx_px * camera.baseline_m)
     weight = np.minimum(sure, np.quantile(sure, 0.9)) if len(sure) else sure
     for _ in range(RIGID_ITERATIONS):
@@ -119,7 +122,7 @@ def rigid(seen: SeenPairs, camera: Camera) -> Poses:
 
 
 def _fit(seen: SeenPairs, here: Floats, there: Floats, weight: Floats) -> Poses:
-    """Weighted, of each frame: there = R here + p (Kabsch 1976)."""
+    """Fits each frame's there = R here + p with weights (Kabsch 1976)."""
 
     def total(values: Floats) -> Floats:
         return sum_by_frame(seen.frame, seen.frame_count, values)
@@ -135,7 +138,7 @@ def _fit(seen: SeenPairs, here: Floats, there: Floats, weight: Floats) -> Poses:
 def _gauss_newton(
     seen: SeenPairs, camera: Camera, motion: Poses, scale_px: float
 ) -> tuple[Floats, Floats]:
-    """One robust step (rho, theta) on the left of each motion."""
+    """Returns one robust step (rho, theta) on the left of each motion."""
     pairs = _residuals(seen, camera, motion)
     weight = pairs.ahead / (1 + pairs.d2 / scale_px**2) ** 2
     JW = product(pairs.J.swapaxes(0, 1), pairs.W * weight)
@@ -149,18 +152,20 @@ def _gauss_newton(
 
 
 class _Residuals(NamedTuple):
-    """Of (uL, v, disparity), with the pairs on the last axis."""
+    """Residuals of (uL, v, disparity), with the pairs on the last axis."""
 
     e: Floats  # (3, n)
     J: Floats  # (3, 6, n), by a small step on the left of the motion
     W: Floats  # (3, 3, n), inverse covariance for pixels of unit noise
-    d2: Floats  # of all four pixels: chi-square with as many degrees of freedom
-    ahead: NDArray[np.bool_]  # where it stands before the second camera
+    d2: Floats  # of all four pixels: chi-square with four degrees of freedom
+    ahead: NDArray[np.bool_]  # in front of the second camera
 
 
 def _residuals(seen: SeenPairs, camera: Camera, motion: Poses) -> _Residuals:
-    """A residual has the noise of the second pixels and of the point, which the first pixels gave.
-    Without the second part far points, whose depth is hardly known, bend the motion.
+    """Returns the residuals, with the noise of the second pixels and of the point by the first
+    ones.
+
+    Without the latter far points, whose depth is hardly known, would bend the motion.
     """
     R, p = np.moveaxis(motion.R, 0, -1)[..., seen.frame], motion.p.T[:, seen.frame]
     h, Jx, J = linearised(camera, measured(camera, seen.first_pixels).T, R, p)
@@ -174,17 +179,19 @@ def _residuals(seen: SeenPairs, camera: Camera, motion: Poses) -> _Residuals:
 
 
 def distance2(seen: SeenPairs, camera: Camera, motion: Poses) -> Floats:
-    """Squared distance of each pair from the motion, in pixels' unit noise: chi-square of four, and
-    infinite behind the camera. A depth that is hardly known makes no distance.
+    """Returns each pair's squared distance from the motion, in pixels' unit noise: chi-square of
+    four.
+
+    Infinite behind the camera. An uncertain depth adds nothing.
     """
     pairs = _residuals(seen, camera, motion)
     return np.where(pairs.ahead, pairs.d2, np.inf)
 
 
 def pixel_sigma(seen: SeenPairs, camera: Camera, motion: Poses) -> float:
-    """The pixels' noise as the two views of the points tell it, px; NaN with too few pairs.
+    """Returns the pixel noise by the two views of the points, px; NaN with too few pairs.
 
-    The median makes it robust. Only frames count whose motion has pairs enough.
+    The median makes it robust. Only frames count whose motion has enough pairs.
     """
     enough = (seen.counts() >= 2 * PAIRS_MIN)[seen.frame]
     pairs = _residuals(seen, camera, motion)

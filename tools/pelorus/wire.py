@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Frames on the wire: sequence, CRC-32, COBS and delimiter (docs/REPLAY-FORMAT.md).
 
-`Reader` takes bytes in pieces of any size, as a UART or a file delivers them, and goes on behind
-damage; `Writer` is its counterpart. `Counts` says what was read and what was lost.
+`Reader` takes bytes in pieces of any size, as a UART or a file delivers them, and continues after
+damage; `Writer` is its counterpart. `Counts` has what was read and what was lost.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from pelorus.layout import MalformedPayload
 VERSION_MAJOR = schema.LIMITS["version_major"]
 DELIMITER = b"\0"
 BODY_BYTES_MIN = schema.LIMITS["overhead_bytes"]  # kind, sequence, CRC
-STUFFED_BYTES_MAX = 1 << 20  # ten times this version's longest frame; bounds what is held
-HOPELESS_BYTES = 1 << 20  # where as many hold no good frame, no more will come
+STUFFED_BYTES_MAX = 1 << 20  # ten times this version's longest frame; limits the buffer
+HOPELESS_BYTES = 1 << 20  # after so many bytes without a good frame no more will come
 SEQUENCE_MODULUS = 1 << 16
 KINDS: dict[int, type[Message]] = {cls.kind: cls for cls in Message.__subclasses__()}
 assert {evidence.Evidence, calibrated.Calibrated} <= set(KINDS.values())
@@ -38,14 +38,14 @@ class VersionError(PelorusError):
 
 
 class Received(NamedTuple):
-    """A good frame, and where in the stream it began."""
+    """A good frame, and its offset in the stream."""
 
     message: Message
     sequence: int
     offset: int
 
 
-class Fault(NamedTuple):
+class SkippedFrame(NamedTuple):
     """A frame that was skipped."""
 
     offset: int
@@ -54,7 +54,7 @@ class Fault(NamedTuple):
 
 @dataclass
 class Counts:
-    """What a reader met. `missing` are the gaps of the sequence, damaged frames among them."""
+    """A reader's counts. `missing` are the gaps of the sequence, including damaged frames."""
 
     bytes: int = 0
     frames: Counter[Kind] = field(default_factory=Counter)
@@ -63,7 +63,7 @@ class Counts:
     malformed: int = 0
     too_long: int = 0
     missing: int = 0
-    faults: list[Fault] = field(default_factory=list)
+    faults: list[SkippedFrame] = field(default_factory=list)
 
     @property
     def good(self) -> int:
@@ -75,16 +75,16 @@ class Counts:
 
     @property
     def ended(self) -> bool:
-        """Whether an END was read; without one the recording was cut short."""
+        """Returns whether an END was read; without one the recording was cut short."""
         return self.frames[Kind.END] > 0
 
     def fault(self, offset: int, what: str) -> None:
         if len(self.faults) < FAULTS_KEPT:
-            self.faults.append(Fault(offset, what))
+            self.faults.append(SkippedFrame(offset, what))
 
 
 def encode(message: Message, sequence: int) -> bytes:
-    """One whole frame: COBS(kind, sequence, payload, CRC) and the delimiter."""
+    """Returns one whole frame: COBS(kind, sequence, payload, CRC) and the delimiter."""
     body = struct.pack("<BH", message.kind, sequence % SEQUENCE_MODULUS) + message.pack()
     return cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + DELIMITER
 
@@ -95,15 +95,15 @@ class Reader:
     def __init__(self, counts: Counts | None = None) -> None:
         self.counts = Counts() if counts is None else counts
         self._held = bytearray()
-        self._held_at = 0  # offset in the stream of the first held byte
-        self._overlong = False  # the held bytes are the rest of a frame that was given up
+        self._held_at = 0  # offset in the stream of the first buffered byte
+        self._overlong = False  # the buffered bytes are the rest of a frame that was given up
         self._expected = 0
 
     def feed(self, piece: bytes) -> Iterator[Received]:
-        """Yield the frames that `piece` completes."""
+        """Yields the frames that `piece` completes."""
         self.counts.bytes += len(piece)
         self._held += piece
-        if DELIMITER not in piece:  # what is held is not looked through again for each piece
+        if DELIMITER not in piece:  # buffered bytes are not searched again for each piece
             self._give_up_on_overlong()
             return
         *whole, rest = bytes(self._held).split(DELIMITER)
@@ -118,18 +118,18 @@ class Reader:
         self._give_up_on_overlong()
 
     def finish(self) -> None:
-        """The stream is over: a frame that lacks its delimiter was cut off, hence damaged."""
+        """Ends the stream: a frame that lacks its delimiter was cut off, hence damaged."""
         if self._held and not self._overlong:
             self._damaged(self._held_at, "cut off by the end of the stream")
         self._held.clear()
 
     def lose(self, why: str) -> None:
-        """The rest of the stream cannot be had: one frame more is damaged, and no END will come.
+        """Ends a stream that fails: one more frame is damaged, and no END will come.
 
-        It stands before all other faults, which it may be the cause of.
+        The fault is listed before all others, which it may have caused.
         """
         self.counts.damaged += 1
-        self.counts.faults.insert(0, Fault(self.counts.bytes, f"damaged: {why}"))
+        self.counts.faults.insert(0, SkippedFrame(self.counts.bytes, f"damaged: {why}"))
 
     def _give_up_on_overlong(self) -> None:
         if len(self._held) <= STUFFED_BYTES_MAX:
@@ -155,7 +155,7 @@ class Reader:
         return self._message(kind, sequence, content[3:], offset)
 
     def _checked(self, stuffed: bytes, offset: int) -> bytes | None:
-        """Kind, sequence and payload of an undamaged frame."""
+        """Returns kind, sequence and payload of an undamaged frame."""
         body = cobs.decode(stuffed)
         if body is None:
             self._damaged(offset, "not valid COBS")
@@ -187,7 +187,7 @@ class Reader:
         return Received(message, sequence, offset)
 
     def _count_missing(self, sequence: int) -> None:
-        """A step back, as after a sender's restart, is no gap of almost 2^16 frames."""
+        """Counts missing frames; a step back, as after a restart, is no gap of almost 2^16."""
         gap = (sequence - self._expected) % SEQUENCE_MODULUS
         if gap < SEQUENCE_MODULUS // 2:
             self.counts.missing += gap
@@ -203,7 +203,7 @@ class Reader:
 
 
 def end_of(counts: Counter[Kind], heard: End | None = None) -> End:
-    """The END behind that many frames; what has arrived is as another END says."""
+    """Returns the END after that many frames; `heard` gives what has arrived."""
     sent = End(
         twists=counts[Kind.TWIST],
         stereos=counts[Kind.STEREO],
@@ -232,13 +232,14 @@ class Writer:
         self._counts[message.kind] += 1
 
     def end(self, heard: End | None = None) -> None:
-        """`heard` is a robot's END: what it says of what has arrived goes into this one."""
+        """Closes the stream; `heard` is a robot's END, whose numbers go into this one."""
         self.write(end_of(self._counts, heard))
 
 
 def write_file(path: Path, messages: Iterable[Message], count: int) -> int:
-    """The whole file, packed if its name says so; its size in bytes. Nothing is left behind if that
-    fails. `count` of them, for the progress.
+    """Writes the whole file, packed if its name says so; returns its size in bytes.
+
+    Nothing remains if that fails. `count` is the number of messages, for the progress.
     """
     with whole(path) as (part,), writing(path):
         with closing(packed_file.create(part, packed_file.is_packed(path))) as stream:
@@ -250,7 +251,7 @@ def write_file(path: Path, messages: Iterable[Message], count: int) -> int:
 
 
 def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], Counts]:
-    """All good frames of a file, packed or not, and the counts.
+    """Returns all good frames of a file, packed or not, and the counts.
 
     Raises PelorusError where nothing can be read.
     """
@@ -259,7 +260,7 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
 
 
 def frames_in(path: Path, counts: Counts, piece_bytes: int = 1 << 16) -> Iterator[Received]:
-    """The same, one after the other."""
+    """Yields the same, one after the other."""
     if path.is_dir():
         raise PelorusError(
             f"{path}: is a folder, a recording is a .plr file: `pelorus convert` makes one of a "
@@ -274,7 +275,7 @@ def frames_in(path: Path, counts: Counts, piece_bytes: int = 1 << 16) -> Iterato
                 found = True
                 yield frame
             if not found and counts.bytes > HOPELESS_BYTES:
-                break  # a picture, a disk's image: some have terabytes
+                break  # not a recording but a picture or a disk's image, of terabytes
     except packed_file.PackingDamaged as error:
         reader.lose(str(error))
     except OSError as error:
@@ -293,12 +294,12 @@ def frames_in(path: Path, counts: Counts, piece_bytes: int = 1 << 16) -> Iterato
 
 
 def messages_of(path: Path) -> list[Message]:
-    """What a recording holds, without its damaged frames; it must have a HEADER."""
+    """Returns a recording's messages without its damaged frames; it must have a HEADER."""
     return counted_messages_of(path)[0]
 
 
 def counted_messages_of(path: Path) -> tuple[list[Message], Counts]:
-    """The same, and what was left out."""
+    """Returns the same, and what was left out."""
     if not path.exists():
         raise PelorusError(f"{path}: there is no such file")
     counts = Counts()
@@ -309,18 +310,19 @@ def counted_messages_of(path: Path) -> tuple[list[Message], Counts]:
 
 
 def header_of_messages(messages: Iterable[Message]) -> Header:
-    """The HEADER of what `messages_of` gave."""
+    """Returns the HEADER among the messages of `messages_of`."""
     return next(m for m in messages if isinstance(m, Header))
 
 
 def stuffed_of(path: Path) -> list[bytes]:
-    """The frames, still to be read, of a sound file that a program of ours has just written."""
+    """Returns the undecoded frames of a sound file that our own program has just written."""
     return path.read_bytes().split(DELIMITER)
 
 
 def only(frames: Iterable[bytes], kind: Kind) -> Iterator[Message]:
-    """The messages of that kind of what `stuffed_of` gave: the others are passed over unread, which
-    takes a tenth of the time.
+    """Yields the messages of one kind among frames of `stuffed_of`.
+
+    The others are skipped undecoded, which takes a tenth of the time.
     """
     for stuffed in frames:
         if len(stuffed) > 1 and stuffed[1] == kind:  # stuffed[0] is COBS's: no kind is zero
@@ -330,7 +332,7 @@ def only(frames: Iterable[bytes], kind: Kind) -> Iterator[Message]:
 
 
 def header_of(received: list[Received], path: Path) -> Header:
-    """The first HEADER; without one nothing in the recording has a meaning."""
+    """Returns the first HEADER; raises an error without one."""
     for frame in received:
         if isinstance(frame.message, Header):
             return frame.message

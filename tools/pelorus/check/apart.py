@@ -43,21 +43,21 @@ from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory, estimate_in
 
 WINDOW_FRAMES, WINDOWS_MOST = 60, 12
-SETTLED = 3  # frames of a window that say nothing yet
-ENOUGH = 60  # numbers compared in a window
-TELLS = 0.1  # of a direction's variance must be the lost half's, else rounding is compared
-DOF = 6  # numbers of a window that are independent: its poses are one walk
-MEDIAN = 0.89  # of chi-square with 6 degrees of freedom, divided by its mean
+SETTLED = 3  # frames at the beginning of a window that are not compared
+ENOUGH = 60  # a window with fewer comparable numbers is left out
+TELLS = 0.1  # least share of a direction's variance that the left-out half adds
+DOF = 6  # independent numbers of a window: its poses are one walk
+MEDIAN = 0.89  # median of chi-square with 6 degrees of freedom, divided by its mean
 SURE = 3.0  # standard deviations
-FILTERS_OWN = 2.0  # no filter is quite the best estimate: with white noise up to 1.8 was seen
+FILTERS_OWN = 2.0  # the filter is not optimal: up to 1.8 was seen with white noise
 
 Estimate = tuple[Trajectory, Floats]
 Masks = dict[str, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
-class Apart:
-    """How far apart, as a ratio of squares, by the way in which the points are parted."""
+class HalvesApart:
+    """How far apart the halves are, as a ratio of squares, for each way of splitting the points."""
 
     by_way: dict[str, float]
     windows: int
@@ -68,17 +68,19 @@ class Apart:
 
     @property
     def ratio(self) -> float:
-        """The largest: what one way parts another mixes."""
+        """Returns the largest ratio of all ways: errors that one way separates, another mixes."""
         return max(self.by_way.values(), default=float("nan"))
 
     @property
-    def due(self) -> float:
-        """What white noise gives: the largest of four is a standard deviation above their mean."""
+    def expected(self) -> float:
+        """Returns the ratio expected of white noise: the largest of four, a sigma above the
+        mean.
+        """
         return 1 + self._chance
 
     @property
     def by_chance(self) -> float:
-        """White noise seldom gives more; nor do the filter's own approximations."""
+        """Returns the ratio that white noise and the filter's own approximations seldom exceed."""
         return max(1 + SURE * self._chance, FILTERS_OWN)
 
     @property
@@ -87,13 +89,11 @@ class Apart:
 
 
 class Inflated(NamedTuple):
-    """How many times larger noises make halves agree, and how far apart they are before and with
-    them.
-    """
+    """The factor of the noises, and how far apart the halves are without and with it."""
 
     times: float
-    before: Apart
-    after: Apart
+    before: HalvesApart
+    after: HalvesApart
 
     @property
     def is_larger(self) -> bool:
@@ -106,12 +106,12 @@ class _Part(NamedTuple):
     path: Path
 
 
-# What an error of the calibration does, it does to both halves.
+# Both halves share every error of the calibration, so its sigmas are off here.
 SAME_CAMERA = dict.fromkeys(CALIBRATION_SIGMAS, "0")
 
 
 class Parts:
-    """Windows and halves of a recording, written once and replayed with many settings."""
+    """Windows and halves of a recording, written to files once and replayed with many settings."""
 
     def __init__(self, program: Path, messages: Sequence[Message], folder: Path) -> None:
         self._program = program
@@ -134,8 +134,8 @@ class Parts:
         write(path, messages)
         self._parts.append(_Part(k, way, path))
 
-    def apart(self, settings: Settings) -> Apart:
-        """With these settings. Windows that tell too little are left out."""
+    def apart(self, settings: Settings) -> HalvesApart:
+        """Returns how far apart halves are with these settings, by windows with enough data."""
         options = options_of({**settings, **SAME_CAMERA})
         with ThreadPoolExecutor(cpu_count() or 1) as pool:
             ran = pool.map(lambda part: self._estimate(part, options), self._parts)
@@ -152,7 +152,7 @@ class Parts:
             count = sum(n for _, n in found)
             if count >= ENOUGH:
                 ratios.setdefault(way, []).append(sum(d2 for d2, _ in found) / count)
-        return Apart(
+        return HalvesApart(
             {way: _typical(values) for way, values in ratios.items()},
             min(map(len, ratios.values()), default=0),
         )
@@ -160,22 +160,22 @@ class Parts:
     def _estimate(self, part: _Part, options: Sequence[str]) -> Estimate | None:
         try:
             answers = stuffed_answers(self._program, part.path, options)
-        except NothingUsefulError:  # not a frame of so short a part could be used
+        except NothingUsefulError:  # not one frame of so short a part could be used
             return None
         return estimate_in(list(wire.only(answers, Kind.POSE)))
 
 
 def _typical(values: Sequence[float]) -> float:
-    """Of most windows: a car that passes is no noise."""
+    """Returns the scaled median of the windows, so that one passing car counts little."""
     return float(np.mean(values) if len(values) < 3 else np.median(values) / MEDIAN)
 
 
 def compare(whole: Estimate, part: Estimate) -> tuple[float, int]:
-    """d^T (P_part - P_whole)^-1 d over the frames, where that tells, and how many numbers it is of.
+    """Returns d^T (P_part - P_whole)^-1 d summed over the frames, and its degrees of freedom.
 
-    In directions in which the part's variance is hardly larger, both know as much (from the
-    twists): there nothing is compared. Nor where the two have not laid the world at one frame, as
-    with an IMU after a start in motion.
+    Only directions in which the part's variance is clearly larger are compared: in the others both
+    estimates rest on the twists. Nothing is compared where the two have not placed the world frame
+    alike, as with an IMU after a start in motion.
     """
     laid = [world_laid(P) for _, P in (whole, part)]
     if whole[0].t_ns[laid[0]] != part[0].t_ns[laid[1]]:
@@ -205,8 +205,10 @@ def compare(whole: Estimate, part: Estimate) -> tuple[float, int]:
 
 
 def windows(messages: Sequence[Message]) -> Iterator[list[Message]]:
-    """Drives of their own, each with the twists since the frame before it. What holds for the
-    whole alone, a start or a compass, is left out. Of an IMU's drive the whole.
+    """Yields windows of the drive as recordings of their own, each with the twists that precede it.
+
+    Messages that hold for the whole drive only (a start, a compass) are left out. A drive by an IMU
+    is one window.
     """
     if any(isinstance(m, Imu) for m in messages):
         yield list(messages)
@@ -227,7 +229,7 @@ def windows(messages: Sequence[Message]) -> Iterator[list[Message]]:
 
 
 def halves(tracks: Tracks) -> tuple[NDArray[np.int64], Masks]:
-    """The ids, and those of the first half by each way: as many observations in either."""
+    """Returns the ids, and for each way a mask of the first half of the observations."""
     ids, of_id = np.unique(tracks.id, return_inverse=True)
     count = np.bincount(of_id, minlength=len(ids))
     mean = [
@@ -250,7 +252,7 @@ def halves(tracks: Tracks) -> tuple[NDArray[np.int64], Masks]:
 
 
 def of_points(messages: Sequence[Message], ids: NDArray[np.int64]) -> list[Message]:
-    """The same with these points alone."""
+    """Returns the messages with the observations of these ids only."""
     out: list[Message] = []
     for message in messages:
         if isinstance(message, Stereo):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The biases of a recording's twists, as both halves of the drive tell them alike.
+"""Estimates the biases of a recording's twists where both halves of the drive agree on them.
 
-What else looks like a bias for a while does not stay the same.
+Other errors that look like a bias for a while differ between the halves.
 """
 
 from __future__ import annotations
@@ -20,28 +20,30 @@ from pelorus.schema import DEFAULTS
 
 WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
 PRIORS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
-SURE = 3.0  # sigmas that the common part of two halves' biases must be from zero
-ALLOWS = 2.0  # sigmas of a prior
-ALIKE = 0.7  # cosine of the angle between them
+SURE = 3.0  # sigmas by which the halves' common bias must differ from zero
+ALLOWS = 2.0  # a bias of so many prior sigmas is allowed
+ALIKE = 0.7  # cosine of the largest angle between the halves' biases
 
 
-class Told(NamedTuple):
-    """Of the axes that are measured: the size of their bias, 0 if chance may have made it, and to
-    how much both halves together tell one.
+class CommonBias(NamedTuple):
+    """The common bias of both halves over the measured axes.
+
+    `size` is 0 where chance may have made it; `known` is the standard error of one axis.
     """
 
     size: float
     known: float
 
 
-def told_by_halves(
+def biases_by_halves(
     bench: Bench, fixed: Settings, values: Mapping[str, float]
 ) -> tuple[dict[str, str], str]:
-    """Of each kind that both halves of the drive tell alike, if the drive is likelier with it.
+    """Returns the settings with bias priors, and what was found in words.
 
-    As wide as what they tell: of priors the likeliest may be narrower than the bias of the one axis
-    that has one, for the three axes share it. Where they tell none there may be one that the drive
-    cannot tell, so the prior is what it could not, and no wider than it is by default.
+    A kind of bias (velocity or rate) is switched on if both halves agree on it and the drive is
+    likelier with it. The prior is as wide as the bias found, not the likeliest one: the three axes
+    share a prior, and one axis alone may have a bias. Where the halves show none, the prior is the
+    size that the drive cannot exclude, and no wider than the default.
     """
     side = {**fixed, **WIDE, **written(values, TWIST)}
     halves = _halves(bench, side)
@@ -61,17 +63,19 @@ def told_by_halves(
     )
 
 
-def told_in_drift(
+def gyro_bias_in_drift(
     bench: Bench, fixed: Settings, values: Mapping[str, float], shared_px: float = 0.0
 ) -> tuple[dict[str, str], str]:
-    """Where tracks drift both halves of the drive must tell the same gyro bias, and a prior that
-    allows it stays. Halves of few frames agree by chance, when errors last for seconds.
+    """Returns the settings with a gyro bias prior for tracks that drift, and what was found in
+    words.
 
-    `shared_px`: a picture that is bent so far moves points from frame to frame by up to so much,
-    all along alike. A bias that turns them by less may be that, and is not switched on.
+    Both halves of the drive must show the same gyro bias. Halves of few frames agree by chance when
+    errors last for seconds.
 
-    Such tracks look like a bias of the velocity all along, so with them there is none of it to be
-    told, and likelihood would find one.
+    `shared_px` is the error that a bent picture gives all points from frame to frame. A bias that
+    turns them by less may be that error, and is not switched on.
+
+    Drifting tracks look like a constant velocity bias, so none is estimated here.
     """
     name = "bias-gyro-sigma"
     if len(bench.examined.frame_t_ns) < 2 * FRAMES_FEW:
@@ -93,8 +97,8 @@ def told_in_drift(
     return dict(fixed), f"{words}, which its prior allows"
 
 
-def _halves(bench: Bench, settings: Settings) -> dict[str, Told]:
-    """By the name of its prior. An axis that nothing measures has none."""
+def _halves(bench: Bench, settings: Settings) -> dict[str, CommonBias]:
+    """Returns the common bias by the name of its prior; axes that nothing measures have none."""
     ran = bench.run_all([{**settings, PART: part} for part in "01"], "biases of both halves")
     twists = bench.examined
     found = {}
@@ -104,18 +108,18 @@ def _halves(bench: Bench, settings: Settings) -> dict[str, Told]:
     ):
         there = np.any(readings != 0, axis=0)
         told = [(half.bias[axes][there], half.bias_variance[axes][there]) for half in ran]
-        found[name] = common_bias(*told[0], *told[1]) if there.any() else Told(0.0, 0.0)
+        found[name] = common_bias(*told[0], *told[1]) if there.any() else CommonBias(0.0, 0.0)
     return found
 
 
-def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> Told:
-    """The errors of the two are independent: their products have no mean but the bias squared."""
+def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> CommonBias:
+    """Returns the common part of two biases with independent errors, from their product."""
     if not (min(var0.min(), var1.min()) > 0):
-        return Told(0.0, 0.0)
+        return CommonBias(0.0, 0.0)
     known = float(np.sqrt(np.mean(1 / (1 / var0 + 1 / var1))))
     products = b0 * b1
     score = float(np.sum(products / np.sqrt(var0 * var1))) / np.sqrt(len(products))
     alike = float(np.sum(products)) / float(np.linalg.norm(b0) * np.linalg.norm(b1) + 1e-30)
     if score < SURE or alike < ALIKE:
-        return Told(0.0, known)
-    return Told(float(np.sqrt(np.mean(products))), known)
+        return CommonBias(0.0, known)
+    return CommonBias(float(np.sqrt(np.mean(products))), known)

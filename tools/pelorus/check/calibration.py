@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What images and twists of a run together say of the camera."""
+"""What the images and twists of a run show of the camera's calibration."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from pelorus.frames import Message
 
 
 @dataclass(frozen=True)
-class Calibration:
-    """None: too few frames tell, or the fault that they show stops all else."""
+class CalibrationDoubts:
+    """Doubts about scale and mounting. None: too few frames, or a fault must be mended first."""
 
     scale: Doubt | None = None
     turn: Turned | None = None
 
     @property
     def settings(self) -> dict[str, str]:
-        """By which the covariances contain what is off, where they do not."""
+        """Returns the settings with which the covariances cover the errors, if they do not."""
         return {
             name: value
             for part in (self.scale, self.turn)
@@ -32,15 +32,18 @@ class Calibration:
 
     @property
     def share(self) -> float:
-        """Of the way, by which positions may be off, if more than the filter says."""
+        """Returns the position error as a share of the way, if it is more than the filter says."""
         return hypot(*(part.beyond for part in (self.scale, self.turn) if part is not None))
 
 
 def calibration(
     agreed: Callable[[float], Agreement | None], messages: Sequence[Message]
-) -> Calibration:
-    """Of a run by twists; `agreed` is what the recording tells beside a bias of so many m/s."""
+) -> CalibrationDoubts:
+    """Returns what a run by twists shows of the calibration.
+
+    `agreed` returns how far images and twists agree beside a velocity bias of a given sigma, m/s.
+    """
     found = agreed(max(bias_of(messages), NO_BIAS_MPS))
-    if found is None or not found.told:
-        return Calibration()
-    return Calibration(doubted(found, messages), turned(found, messages))
+    if found is None or not found.is_known:
+        return CalibrationDoubts()
+    return CalibrationDoubts(doubted(found, messages), turned(found, messages))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the settings that were found change, in words and as lines of a config."""
+"""Lists the settings that were changed, in words and as lines of a config."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from pelorus.check.parameters import Tuned, of_process, starting
 from pelorus.check.tracks_noise import DRIFT
 from pelorus.frames import Header
 
-OTHER_SIGMA = 1.2  # a setting that differs by more is told
+OTHER_SIGMA = 1.2  # ratio of sigmas from which a change is reported
 
 
 def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
-    """`pixel-sigma 2 should be 1`: what differs by more than a fifth, or in words."""
+    """Returns changes of more than a fifth as sentences: `pixel-sigma 2 should be 1`."""
     return [
-        f"{' '.join(filter(None, (name, was)))} should be {due}"
-        for name, was, due in _changed(given, header, tuned, by_imu)
+        f"{' '.join(filter(None, (name, was)))} should be {expected}"
+        for name, was, expected in _changed(given, header, tuned, by_imu)
     ]
 
 
 def lines(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
-    """The same as lines of a config."""
-    return [f"{name} = {due}" for name, _, due in _changed(given, header, tuned, by_imu)]
+    """Returns the same changes as lines of a config."""
+    return [f"{name} = {expected}" for name, _, expected in _changed(given, header, tuned, by_imu)]
 
 
 def _changed(
     given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
 ) -> Iterator[tuple[str, str, str]]:
-    """Name, what it was if that is a number, and what it should be."""
+    """Yields each setting's name, its old value if that is a number, and its new value."""
     parameters = of_process(by_imu)
     before = starting(header, given, parameters)
     for name, parameter in parameters.items():

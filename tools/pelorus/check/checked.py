@@ -18,7 +18,7 @@ from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
-from pelorus.check.verdict import Grade, Remark, Run, Verdict, of_search, verdict_of
+from pelorus.check.verdict import Grade, JudgedRun, Remark, Verdict, of_search, verdict_of
 from pelorus.console import progress, step
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
@@ -34,32 +34,34 @@ NOTHING_USED = "no frame could be used"  # words of pelorus-replay
 
 @dataclass(frozen=True)
 class Checked:
-    """`verdict` with the settings that are written, `as_given` with those that were given; `notes`
-    of the search. `rows`: title, before, after.
+    """The result of a check.
+
+    `verdict` is that with the written settings, `as_given` that with the given ones; `notes` are of
+    the search. Each of `rows` is (title, before, after).
     """
 
     verdict: Verdict
-    as_given: Verdict | None  # None: nothing was used with them, or a fault stands in the way
+    as_given: Verdict | None  # None: no frame was used, or a fault stands in the way
     notes: list[Remark]
     spells: list[str]
     changes: list[str]
     rows: list[tuple[str, str, str]]
     tuned: Tuned | None  # None where a fault must be mended first
-    lines: tuple[str, ...] = ()  # of a config: what should be set otherwise
+    lines: tuple[str, ...] = ()  # of a config: the settings that should change
 
     @property
     def remarks(self) -> list[Remark]:
-        """Of the run, and of the search."""
+        """Returns the remarks of the run, and after them those of the search."""
         return [*self.verdict.remarks, *self.notes]
 
     @property
     def grade(self) -> Grade:
-        """Of the verdict."""
+        """Returns the verdict's grade."""
         return self.verdict.grade
 
     @property
     def was(self) -> str:
-        """The verdict with the settings that were given, where it is another one."""
+        """Returns the verdict with the given settings, where that differs."""
         if self.tuned is None:
             return ""
         if self.as_given is None:
@@ -69,7 +71,7 @@ class Checked:
         return f"with the settings as they are: {self.as_given.words}"
 
     def next_step(self, tuned: Path) -> str:
-        """What to do now."""
+        """Returns what to do next, in words."""
         if self.tuned is None:
             return f"mend this first, and convert again: {self.verdict.doubts[0].partition(':')[0]}"
         if not self.lines:
@@ -78,7 +80,7 @@ class Checked:
 
 
 def check(program: Path, recording: Path, given: Settings, folder: Path) -> Checked:
-    """Tune in the folder, then replay the whole recording with both settings."""
+    """Tunes in the folder, then replays the whole recording with old and new settings."""
     step("faults of the recording")
     bench = Bench(program, recording, folder, given.get("process", ""))
     messages = wire.messages_of(recording)
@@ -135,8 +137,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
 
 def _whole(
     program: Path, recording: Path, settings: Settings, folder: Path, name: str
-) -> Run | None:
-    """None if not one frame could be used, as with a clock that is off."""
+) -> JudgedRun | None:
+    """Returns the replay of the whole recording; None if no frame could be used."""
     outputs = Outputs.named(folder, name)
     try:
         replay(program, recording, options_of(settings), outputs)
@@ -144,10 +146,10 @@ def _whole(
         if NOTHING_USED in str(error):
             return None
         raise
-    return Run.of(wire.messages_of(outputs.log))
+    return JudgedRun.of(wire.messages_of(outputs.log))
 
 
-def _figures(run: Run, truth: Trajectory | None) -> dict[str, str]:
+def _figures(run: JudgedRun, truth: Trajectory | None) -> dict[str, str]:
     found = {
         "innovations over their noise": f"{run.nis:.2f}",
         "matches rejected": f"{run.gated_share:.1%}",
@@ -163,7 +165,7 @@ def _figures(run: Run, truth: Trajectory | None) -> dict[str, str]:
 
 
 def config_text(found: Checked, recording: Path) -> str:
-    """A settings file, with what was found as its remarks."""
+    """Returns a settings file, with the findings as comments."""
     assert found.tuned is not None
     lines = [f"# pelorus check {recording.name}: {found.verdict.words}"]
     lines += [f"#   {words}" for words in found.verdict.doubts]

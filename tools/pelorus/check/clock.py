@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""By how much the camera's clock is off: the offset that makes what was seen likeliest.
+"""Finds by how much the camera's clock is off: the offset with the greatest likelihood.
 
-About its least, the cost of an offset is a parabola: cost = least + (offset - best)^2 / sigma^2. So
-its foot is the offset, and its bend says how well the recording tells it. A single cost jumps
-by chance, since each offset brings other readings' noise together in a frame; so the parabola is
-laid through many offsets, and not through the best three. How far its foot moves when
-parts of the drive are left out, one after the other (the jackknife), says how well they agree.
+Near its minimum the cost of an offset is a parabola: cost = least + (offset - best)^2 / sigma^2.
+Its vertex is the offset, and its curvature gives the standard error. A single cost jumps by chance,
+since each offset averages other readings in a frame; so the parabola is fitted to many offsets, not
+to the best three. How far the vertex moves when parts of the drive are left out in turn (the
+jackknife) says how well the parts agree.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 
 FEWEST = 5  # points of a parabola
-PARTS = 20  # of the drive, to see how well they agree
-COARSE_S = 0.01  # from one offset tried to the next, at least
-NEAR_STEPS = 2  # of these, where the offset is roughly known
-NEAR_S = 0.04  # to either side of the best of them: farther off it is no parabola
+PARTS = 20  # of the drive, for the jackknife
+COARSE_S = 0.01  # least step between two offsets that are tried
+NEAR_STEPS = 2  # so many steps where the offset is roughly known
+NEAR_S = 0.04  # to either side of the best one; farther off the cost is no parabola
 SHRINK = 3.0
-# The middle of what a reading stands for, in readings beside its own time, by the timing's name.
+# Middle of the interval that a reading describes, in intervals after its stamp, by timing.
 MIDDLES = {"start": 0.5, "mid": 0.0, "end": -0.5}
 FINEST_S = 2e-5
-STEP_SIGMAS = 2.0  # steps of so many sigmas tell the foot best
-SURE_OF_PARTS = 0.04  # of a reading: with such a sigma the least is not made by its parts
+STEP_SIGMAS = 2.0  # a step of so many sigmas locates the vertex best
+SURE_OF_PARTS = 0.04  # of a reading's interval: a smaller sigma is no artefact of averaging
 
 
 @dataclass(frozen=True)
 class Offset:
-    """Seconds to be added to the frames' times; `sigma_s` is infinite if nothing tells it."""
+    """Seconds to add to the frames' times; `sigma_s` is infinite if nothing is known."""
 
     best_s: float
     sigma_s: float
-    bend_s: float = float("inf")  # sigma by the bend alone: finer steps may lie on a parabola
+    bend_s: float = float("inf")  # sigma by the curvature alone
 
     @property
     def gain(self) -> float:
-        """By how much it is likelier than none, -2 ln of the ratio."""
+        """Returns -2 ln of the likelihood ratio against no offset."""
         return (self.best_s / self.sigma_s) ** 2 if self.sigma_s > 0 else 0.0
 
 
@@ -50,10 +50,10 @@ UNTOLD = Offset(0.0, float("inf"))
 
 
 def of_twists(bench: Bench, settings: Settings) -> Offset:
-    """Moved by whole readings only; untold where there is a single reading a frame.
+    """Estimates the offset by twists in steps of whole readings; unknown with one reading a frame.
 
-    An offset by a part of a reading would have each frame average one reading more, and win for the
-    smaller noise alone.
+    A fraction of a reading would make each frame average one reading more, and win by the smaller
+    noise alone.
     """
     period_s = seconds(bench.examined.twist_t_ns)
     if seconds(bench.examined.frame_t_ns) < 2 * period_s or not period_s > 0:
@@ -71,10 +71,10 @@ def of_twists(bench: Bench, settings: Settings) -> Offset:
 def of_imu(
     bench: Bench, settings: Settings, about_s: float = 0.0, reach: int | None = None
 ) -> Offset:
-    """Steps that find the valley first, so many to either side, then finer ones that find its foot.
+    """Estimates the offset by an IMU: coarse steps find the valley, finer ones its vertex.
 
-    They are whole readings as long as that is fine enough: where camera and IMU keep one grid, an
-    offset by parts of a reading changes how many readings a frame averages, too.
+    Steps are whole readings as long as that is fine enough. Where camera and IMU share one time
+    grid, a fraction of a reading changes how many readings a frame averages.
     """
     period_s = seconds(bench.examined.inertial.t_ns)
     if not period_s > 0:
@@ -97,7 +97,7 @@ def of_imu(
 def _valley(
     bench: Bench, settings: Settings, costs: dict[float, Floats], step_s: float
 ) -> tuple[Offset, dict[float, Floats]]:
-    """Two steps to either side of the best that is known; there may be a better one among them."""
+    """Refines two steps to either side of the best known offset, for there may be a better one."""
     tried = -1
     while tried < len(costs):
         tried = len(costs)
@@ -114,7 +114,7 @@ def _best(costs: dict[float, Floats]) -> float:
 def _costs(
     bench: Bench, settings: Settings, about_s: float, step_s: float, most: int
 ) -> dict[float, Floats]:
-    """-2 ln of the likelihood of each part of the drive, by offset."""
+    """Returns -2 ln of the likelihood of each part of the drive, by offset."""
     offsets = (about_s + k * step_s for k in range(-most, most + 1))
     tried = [float(f"{at:.6f}") for at in offsets if abs(at) <= OFFSET_MOST_S * 1.001]
     ran = bench.run_all([{**settings, OFFSET: f"{at:.6f}"} for at in tried], "clock")
@@ -123,7 +123,9 @@ def _costs(
 
 
 def of_parts(outcome: Outcome, matched: int) -> Floats:
-    """As if so many had been matched: no offset may win by what it loses."""
+    """Returns costs as if `matched` observations had been used, so that losing some gains
+    nothing.
+    """
     if not np.isfinite(outcome.cost):
         return np.full(PARTS, np.inf)
     scale = matched / max(outcome.matched, 1)
@@ -131,8 +133,10 @@ def of_parts(outcome: Outcome, matched: int) -> Floats:
 
 
 def foot(offsets: Floats, costs: Floats) -> Offset:
-    """Of the parabola through all costs, as far as they are finite and lie about it: one of each
-    offset, or a row of those of the drive's parts.
+    """Fits a parabola to all finite costs near the minimum, and returns its vertex and standard
+    error.
+
+    `costs` has one value for each offset, or a row of the values of the drive's parts.
     """
     parts = costs.reshape(len(offsets), -1)
     good = np.isfinite(parts).all(axis=1)
@@ -146,8 +150,8 @@ def foot(offsets: Floats, costs: Floats) -> Offset:
     if not bend > 0:
         return UNTOLD
     best = float(np.clip(-slope / (2 * bend), -1.0, 1.0))
-    # the foot is as sure as the bend says, but no surer than the points lie on a parabola, and
-    # than the drive's parts agree on it
+    # The curvature gives the sigma, enlarged by the residuals from the parabola and by the
+    # disagreement of the drive's parts.
     off = float(np.sum((up - np.polyval((bend, slope, least), across)) ** 2)) / max(len(x) - 3, 1)
     variance = 1 / bend + off / float(np.sum(across**2)) / (2 * bend) ** 2
     variance = max(variance, _by_parts(across, parts))
@@ -156,7 +160,7 @@ def foot(offsets: Floats, costs: Floats) -> Offset:
 
 
 def _by_parts(across: Floats, parts: Floats) -> float:
-    """The jackknife's variance of the foot; 0 where there are no parts."""
+    """Returns the jackknife variance of the vertex; 0 where there are no parts."""
     count = parts.shape[1]
     if count < 2:
         return 0.0
@@ -167,5 +171,5 @@ def _by_parts(across: Floats, parts: Floats) -> float:
 
 
 def seconds(t_ns: Times) -> float:
-    """From one to the next, usually."""
+    """Returns the median interval between two times, seconds."""
     return float(np.median(np.diff(t_ns))) * 1e-9 if len(t_ns) > 2 else 0.0

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A .plr file as a `Recording`, what the examinations of tracks and twists work on; and parts of it
-to be replayed."""
+"""Reads a .plr file as a `Recording` for examination, and cuts parts of it."""
 
 from __future__ import annotations
 
@@ -22,8 +21,10 @@ from pelorus.wire import Writer, header_of_messages
 
 
 def recording_of(messages: Sequence[Message], process: Process | None = None) -> Recording:
-    """Header, twists or readings of an IMU, and tracks. What a filter would refuse, pixels that are
-    not finite and times that do not ascend, is left out. `process` is the HEADER's if not given.
+    """Returns header, twists or IMU readings, and tracks of the messages.
+
+    What a filter would refuse is left out: pixels that are not finite and times that do not ascend.
+    `process` is the HEADER's if not given.
     """
     header = header_of_messages(messages)
     by_imu = (process or header.process) is Process.IMU
@@ -55,7 +56,7 @@ def recording_of(messages: Sequence[Message], process: Process | None = None) ->
 
 
 def _in_order(messages: Sequence[Imu]) -> Inertial:
-    """Readings of ascending times."""
+    """Returns the readings whose times ascend."""
     readings = readings_of(messages)
     newest = np.maximum.accumulate(readings.t_ns)
     return readings.at(np.concatenate(([True], readings.t_ns[1:] > newest[:-1])))
@@ -74,12 +75,12 @@ def _ascending(messages: list[Timed]) -> list[Timed]:
 
 STEADY_NS = 2_000_000_000
 SIDES: tuple[tuple[int, Literal["left", "right"]], ...] = ((-1, "left"), (1, "right"))
-FRAMES_MOST, SEEN_MOST = 4000, 60_000  # so many tell the sigmas to a percent or two
-AHEAD = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK)  # what belongs to each part of a recording
+FRAMES_MOST, SEEN_MOST = 4000, 60_000  # enough to estimate the sigmas to 1 or 2 %
+AHEAD = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK)  # belong to every part of a recording
 
 
 def first_frames(messages: Sequence[Message], most: int = FRAMES_MOST) -> list[Message]:
-    """The recording's beginning, without truth, which is not to be looked at, and without END."""
+    """Returns the recording's beginning, without truth, which must not be used, and without END."""
     out: list[Message] = []
     frames = seen = 0
     for message in messages:
@@ -93,7 +94,7 @@ def first_frames(messages: Sequence[Message], most: int = FRAMES_MOST) -> list[M
 
 
 def half(messages: Sequence[Message], which: int) -> list[Message]:
-    """The first (0) or the second (1) half of the frames with all that goes with them."""
+    """Returns the first (0) or the second (1) half of the frames with the messages between them."""
     at = [k for k, m in enumerate(messages) if isinstance(m, Stereo)]
     middle = at[len(at) // 2]
     if which == 0:
@@ -103,13 +104,13 @@ def half(messages: Sequence[Message], which: int) -> list[Message]:
 
 
 def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
-    """With the frames later by so much, in the order of time: each finds all readings before it."""
+    """Returns the messages, sorted, with the frames later by the offset."""
     ahead = [m for m in messages if m.kind in AHEAD or isinstance(m, Start)]
     data: list[tuple[int, int, Message]] = []
     for message in messages:
         if isinstance(message, Stereo):
             moved = message.t_ns + offset_ns
-            if moved >= 0:  # before time zero there is nothing to see it by
+            if moved >= 0:  # nothing can be predicted to a time before zero
                 data.append((moved, 2, replace(message, t_ns=moved)))
         elif isinstance(message, Twist | Reading):
             data.append((message.t_ns, isinstance(message, Reading), message))
@@ -121,8 +122,11 @@ def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
 
 
 def scaled(messages: Sequence[Message], times: float) -> list[Message]:
-    """With the twists' velocities so many times as large, but not their noise: else the likeliest
-    factor is the one that shrinks it. So what is added is their mean over seconds.
+    """Returns the messages with the twists' velocities multiplied by `times`, and their noise as it
+    was.
+
+    Scaled noise would favour the factor that shrinks it. So the added velocity is their mean over
+    seconds.
     """
     twists = [m for m in messages if isinstance(m, Twist)]
     if times == 1 or not twists:
@@ -137,7 +141,7 @@ def scaled(messages: Sequence[Message], times: float) -> list[Message]:
 
 
 def not_before(messages: Sequence[Message], t_ns: int) -> list[Message]:
-    """All later by so much, where they begin before: then every offset moves the same frames."""
+    """Returns all messages later, none before t_ns, so that every offset moves the same frames."""
     timed = (Stereo, Twist, Imu, Reading, Start)
     least = min((m.t_ns for m in messages if isinstance(m, timed)), default=t_ns)
     later = max(t_ns - least, 0)
@@ -145,8 +149,10 @@ def not_before(messages: Sequence[Message], t_ns: int) -> list[Message]:
 
 
 def within(messages: Sequence[Message], margin_ns: int) -> list[Message]:
-    """Without the frames that are not between two readings wherever an offset up to the margin
-    moves them: so all offsets are judged by the same frames. As they are if that leaves few.
+    """Returns the messages without frames that lack a reading on either side at any offset up to
+    the margin.
+
+    So all offsets are judged by the same frames. If few would be left, all are kept.
     """
     times = [t for m in messages for t in _reading_times(m)]
     if not times:
@@ -164,7 +170,7 @@ def _reading_times(message: Message) -> list[int]:
 
 
 def write(path: Path, messages: Sequence[Message]) -> None:
-    """A recording of these messages."""
+    """Writes these messages as a recording."""
     with path.open("wb") as stream:
         writer = Writer(stream)
         for message in messages:

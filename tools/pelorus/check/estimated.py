@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the filter has estimated of the calibration in a run (setting calibrate), and whether the
-search beside it says the same.
-"""
+"""Compares the calibration that the filter estimated in a run with the search's."""
 
 from __future__ import annotations
 
@@ -10,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.calibrated import PARTS, Calibrated, Part, last_calibrated
-from pelorus.check.calibration import Calibration
+from pelorus.calibrated import PARTS, Calibrated, CalibrationPart, last_calibrated
+from pelorus.check.calibration import CalibrationDoubts
 from pelorus.check.mount import SURE, Turned
 from pelorus.check.options import Settings
 from pelorus.frames import Message
@@ -19,7 +17,7 @@ from pelorus.layout import Floats
 from pelorus.schema import SETTINGS
 from pelorus.settings import IDS, in_force
 
-TOLD = 3.0  # sigmas from which a correction is worth naming
+TOLD = 3.0  # sigmas from which a correction is reported
 OFF_PRIOR = 4.0  # sigmas of the prior, as the filter's own reason CALIBRATION_OFF
 TURN = slice(2, 5)  # of calibrated.PARTS
 PRIORS = {
@@ -34,24 +32,26 @@ PRIORS = {
 
 @dataclass(frozen=True)
 class Estimated:
-    """`off`: settings whose sigma the estimate is far beyond. `refused`: parts that the filter was
-    asked to estimate, and put back (CALIBRATION_OFF). `apart`: the search sees the camera turned
-    otherwise, by so many sigmas.
+    """The calibration that the filter estimated.
+
+    `off`: settings whose sigma the estimate exceeds by far. `refused`: parts that were to be
+    estimated and that the filter put back (CALIBRATION_OFF). `apart`: distance of the filter's turn
+    of the camera from the search's, sigmas.
     """
 
-    told: Calibrated
+    estimate: Calibrated
     off: tuple[str, ...]
     refused: tuple[str, ...]
-    apart: float | None  # None: it has seen none, or the turn is not estimated
+    apart: float | None  # None: the search found no turn, or the turn is not estimated
 
     @property
     def answers_turn(self) -> bool:
-        """Whether nothing is left to be said of the search's turn."""
-        return bool(self.told.estimated >> TURN.start & 1) and (self.apart or 0.0) <= SURE
+        """Returns whether the filter's estimate explains the turn that the search found."""
+        return bool(self.estimate.estimated >> TURN.start & 1) and (self.apart or 0.0) <= SURE
 
     def words(self) -> str:
-        """One sentence."""
-        parts = list(self.told.parts())
+        """Returns the estimate as one sentence."""
+        parts = list(self.estimate.parts())
         clear = [_with_sigma(*part) for part in parts if abs(part[1]) > TOLD * part[2]]
         said = "the filter estimates the calibration on the way"
         if self.refused:
@@ -80,35 +80,42 @@ class Estimated:
         return bool(self.off or self.refused) or (self.apart or 0.0) > SURE
 
 
-def _with_sigma(part: Part, value: float, sigma: float) -> str:
+def _with_sigma(part: CalibrationPart, value: float, sigma: float) -> str:
     return f"{part.name} {value:+.3g} +- {sigma:.2g} {part.unit}"
 
 
-def estimated(messages: Sequence[Message], found: Calibration) -> Estimated | None:
-    """Of a run; None where nothing is estimated."""
-    told = last_calibrated(messages)
-    if told is None:
+def estimated(messages: Sequence[Message], found: CalibrationDoubts) -> Estimated | None:
+    """Returns what a run estimated; None where nothing is estimated."""
+    estimate = last_calibrated(messages)
+    if estimate is None:
         return None
-    return Estimated(told, _off(messages, told), _refused(messages, told), _apart(told, found.turn))
+    return Estimated(
+        estimate,
+        _off(messages, estimate),
+        _refused(messages, estimate),
+        _turns_apart(estimate, found.turn),
+    )
 
 
-def _off(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(_settings_off(messages, told)))
+def _off(messages: Sequence[Message], estimate: Calibrated) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_settings_off(messages, estimate)))
 
 
-def _settings_off(messages: Sequence[Message], told: Calibrated) -> Iterator[str]:
-    for part, value, _ in told.parts():
+def _settings_off(messages: Sequence[Message], estimate: Calibrated) -> Iterator[str]:
+    for part, value, _ in estimate.parts():
         setting = PRIORS[part.key.partition("_")[0]]
         si = value / (1.0 if part.unit == "px" else part.scale)
         if abs(si) > OFF_PRIOR * (in_force(messages, setting) or np.inf):
             yield setting
 
 
-def _refused(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
-    """What the setting calibrate names, and is not estimated in the end."""
+def _refused(messages: Sequence[Message], estimate: Calibrated) -> tuple[str, ...]:
+    """Returns the parts that the setting calibrate names but that are not estimated at the end."""
     asked = int(in_force(messages, "calibrate") or 0)
     words = SETTINGS[IDS["calibrate"]].words
-    parts = [(part.key.partition("_")[0], told.estimated >> k & 1) for k, part in enumerate(PARTS)]
+    parts = [
+        (part.key.partition("_")[0], estimate.estimated >> k & 1) for k, part in enumerate(PARTS)
+    ]
     return tuple(
         word
         for bit, word in enumerate(words)
@@ -116,24 +123,25 @@ def _refused(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
     )
 
 
-def _apart(told: Calibrated, turn: Turned | None) -> float | None:
-    """In sigmas, between the turns of the camera by the filter and by the search, body axes."""
-    if turn is None or not told.estimated >> TURN.start & 1:
+def _turns_apart(estimate: Calibrated, turn: Turned | None) -> float | None:
+    """Returns the distance between the filter's and the search's turn of the camera, sigmas."""
+    if turn is None or not estimate.estimated >> TURN.start & 1:
         return None
-    by_filter, P = turn_in_body(told)
+    by_filter, P = turn_in_body(estimate)
     off = turn.turn_rad - by_filter
     return float(np.sqrt(off @ np.linalg.solve(turn.covariance + P, off)))
 
 
-def turn_in_body(told: Calibrated) -> tuple[Floats, Floats]:
-    """The turn about the body's axes, as Turned has it, rad, and the covariance: T_CB <- Exp(phi)
-    T_CB is T_CB Exp(R_BC phi).
+def turn_in_body(estimate: Calibrated) -> tuple[Floats, Floats]:
+    """Returns the camera's turn about the body's axes, rad, and its covariance, as Turned has them.
+
+    T_CB <- Exp(phi) T_CB is T_CB Exp(R_BC phi).
     """
-    R_BC = np.asarray(told.R_CB).T
-    return R_BC @ told.corrected[TURN], R_BC @ np.diag(told.sigma[TURN] ** 2) @ R_BC.T
+    R_BC = np.asarray(estimate.R_CB).T
+    return R_BC @ estimate.corrected[TURN], R_BC @ np.diag(estimate.sigma[TURN] ** 2) @ R_BC.T
 
 
 def without_clock(given: Settings) -> Settings:
-    """For the search of the clock: where the filter estimated it too, each offset would do."""
+    """Returns the settings for the clock's search, in which the filter estimates no clock."""
     listed = [part for part in given.get("calibrate", "").split(",") if part.strip() != "clock"]
     return {**given, "calibrate": ",".join(listed) or "off"} if "calibrate" in given else given

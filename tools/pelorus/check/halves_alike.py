@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""The noises with which halves of the points tell the same motion (apart.py).
+"""Enlarges the noises until halves of the points give the same motion (apart.py).
 
-How far halves differ says by how much the covariance is too small; it does not say whose errors
-they are. They may be the pixels', or the twists', for two halves weigh the same wrong twist
-differently. So all noises are made larger by one factor, the variance of unit weight of geodesy
-(Baarda, Statistical concepts in geodesy, 1967): an estimate depends on their ratios alone, so it
-stays where it is, and its covariance grows. A larger pixel-sigma alone would leave more to the
-twists, of whose errors halves of the points know nothing.
+The difference of the halves says by how much the covariance is too small, but not whose errors they
+are: the pixels', or the twists', for two halves weigh the same wrong twist differently. So all
+noises are enlarged by one factor, the variance of unit weight of geodesy (Baarda, Statistical
+concepts in geodesy, 1967): the estimate depends on their ratios alone and stays, and its covariance
+grows. A larger pixel-sigma alone would give more weight to the twists, whose errors the halves
+cannot show.
 
-The factor is known before it is tried: where errors are noise, halves with it differ as they
-should. Where they do not, something else moves them (cars, a scale, a clock), and no noises stand
-for that. Nor may larger noises make the filter surer: it widens its covariance by itself while
-pictures and twists contradict each other (NOISE_MISFIT), and wide noises can hide that they do.
+The factor is predicted before it is tried: where errors are noise, halves differ with it as
+expected. Where they do not, the cause is another one (cars, a scale, a clock), which no noise
+covers. Larger noises must not make the filter surer either: it widens its covariance while pictures
+and twists contradict each other (NOISE_MISFIT), and large noises can hide that they do.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from pelorus.frames import Kind
 
 
 def with_halves_alike(bench: Bench, tuned: Tuned) -> Tuned:
-    """The same with at least those noises. As it is on a known map."""
+    """Returns the settings with noises that make the halves agree; unchanged on a known map."""
     if tuned.settings.get("mode", "slam") != "slam" or bench.holds(Kind.LANDMARK):
         return tuned
     offset_s = float(tuned.settings.get("camera-offset", "0"))
@@ -49,13 +49,15 @@ def with_halves_alike(bench: Bench, tuned: Tuned) -> Tuned:
 
 
 def inflate(parts: Parts, of: Callable[[float], Settings]) -> Inflated:
-    """`of`: settings with noises so many times as large. 1 where chance may have moved the halves,
-    or where the factor that is expected does not bring them together.
+    """Returns the factor for the noises, and how far apart the halves are without and with it.
+
+    `of` returns settings with noises enlarged by a factor. The result is 1 where chance explains
+    the difference, or where the predicted factor does not make the halves agree.
     """
     before = parts.apart(of(1.0))
     stays = Inflated(1.0, before, before)
     if not before.ratio > before.by_chance:
         return stays
-    times = float(np.sqrt(before.ratio / before.due))
+    times = float(np.sqrt(before.ratio / before.expected))
     after = parts.apart(of(times))
     return Inflated(times, before, after) if after.ratio <= after.by_chance else stays

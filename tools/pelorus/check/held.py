@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""What was found must hold against what was given, else the latter stays.
+"""Keeps the settings that were found only if they hold against those that were given.
 
-The likeliest noises are those of single steps, and where the errors are what the settings describe,
-new in every reading and every pixel, they are right. What fits one half of the drive alone fits no
-drive to come. And what is off for longer than a step (a gyro that lags, a scale by a percent, a
-lever by centimetres) hides below wide noises; below narrow ones it is a contradiction between
-vision and twists in frame after frame. Then no likelihood of steps can choose, and a filter that
-believed it would be too sure.
+The likeliest noises are those of single steps. They are right if the errors are what the settings
+describe, new in every reading and every pixel. What fits one half of the drive alone fits no other
+drive. An error that lasts longer than a step (a gyro that lags, a scale by a percent, a lever by
+centimetres) is hidden by large noises; with small ones vision and twists contradict each other in
+frame after frame. Then no likelihood of steps can decide, and a filter with the small noises would
+be too sure.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from pelorus.check.outcome import PART, Bench
 from pelorus.check.parameters import Tuned, no_narrower, of_process
 
 CLOCK = ("camera-offset", "twist-timing", "imu-timing")
-BY_CHANCE = 0.05  # of the frames are contradicted in a drive of white noise: at most 0.02 was seen
+BY_CHANCE = 0.05  # share of contradicted frames by chance: at most 0.02 was seen with white noise
 
 
 def held_against(bench: Bench, given: Settings, found: Tuned) -> Tuned:
-    """The settings that were found, or the given ones with the clock that was found."""
+    """Returns the settings that were found, or the given ones with the clock that was found."""
     if found.noise.drifts:
         return _no_narrower(bench, given, found, found.settings) if _denied(found) else found
     yours = _with_clock_of(given, found)
@@ -34,7 +34,7 @@ def held_against(bench: Bench, given: Settings, found: Tuned) -> Tuned:
 
 
 def _denied(found: Tuned) -> bool:
-    """Does vision contradict what was found more often than before?"""
+    """Returns whether vision contradicts more frames with the found settings than before."""
     return found.after.contradicted > max(found.before.contradicted, BY_CHANCE)
 
 
@@ -45,13 +45,13 @@ def _likelier_in_both_halves(bench: Bench, yours: Settings, found: Settings) -> 
 
 
 def _with_clock_of(given: Settings, found: Tuned) -> dict[str, str]:
-    """The clock was judged by a parabola: a single cost depends on how frames cut the readings."""
+    """Returns the given settings with the found clock, which many offsets support."""
     clocked = {k: v for k, v in found.settings.items() if k in CLOCK}
     return {k: v for k, v in given.items() if k not in CLOCK} | clocked
 
 
 def _no_narrower(bench: Bench, given: Settings, found: Tuned, side: Settings) -> Tuned:
-    """Noises that are no smaller than the given ones, which hide what is off; beside `side`."""
+    """Returns noises no smaller than the given ones, beside `side`: they cover lasting errors."""
     noises = no_narrower(bench.header, given, found.settings, of_process(bench.by_imu))
     settings = {**side, **noises}
     why = list(found.lasting)

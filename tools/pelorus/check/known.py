@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a recording tells by itself, whatever a filter makes of it."""
+"""What a recording shows by itself, independently of a filter's run."""
 
 from __future__ import annotations
 
@@ -21,9 +21,7 @@ from pelorus.settings import in_force
 
 @dataclass(frozen=True)
 class Known:
-    """Faults, how well camera and body agree, and the noise of the tracks; nothing of it where a
-    log lacks frames or readings.
-    """
+    """Faults, agreement of camera and body, and track noise; empty without enough data."""
 
     judged: Judged = field(default_factory=lambda: Judged([]))
     noise: TrackNoise | None = None
@@ -36,7 +34,7 @@ class Known:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether a fault must be mended before anything else is worth looking at."""
+        """Returns whether a fault must be mended before anything else is worth examining."""
         return any(fault.stops for fault in self.faults)
 
     @property
@@ -44,13 +42,14 @@ class Known:
         return self.examined is not None and len(self.examined.inertial.t_ns) > 0
 
     def agreed(self, bias_mps: float) -> Agreement | None:
-        """How far camera and twists agree beside a bias of such a sigma; of an IMU the filter tells
-        that itself.
+        """Returns how far camera and twists agree beside a velocity bias of this sigma, m/s.
+
+        None for an IMU, whose biases the filter estimates.
         """
         views = self.judged.views
         if self.examined is None or self.by_imu or views is None:
             return None
-        if bias_mps not in self._agreed:  # it takes longer than all the rest
+        if bias_mps not in self._agreed:  # kept, for it takes longer than all else
             noise = replace(self.examined.header.noise, bias_velocity_sigma_mps=bias_mps)
             short = first_part(self.examined).with_header(noise=noise)
             same = self.examined.header.noise.bias_velocity_sigma_mps == bias_mps
@@ -60,7 +59,7 @@ class Known:
 
 
 def known_of(messages: Sequence[Message]) -> Known:
-    """Of a log, with the process that moved the body in it."""
+    """Examines a log, with the process model that its run used."""
     process = in_force(messages, "process")
     try:
         asked = None if process is None else Process(int(process))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Does it matter for a run's covariances what is wrong all along?"""
+"""Tells whether a constant error matters for a run's covariances."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from pelorus.schema import DEFAULTS
 from pelorus.se3 import Poses
 from pelorus.trajectory import estimate_in
 
-LARGEST = 0.1  # that baseline-sigma takes
-ADDS = 0.5  # to a NEES of 1, a degree of freedom: less does not matter
+LARGEST = 0.1  # largest baseline-sigma that the filter takes
+ADDS = 0.5  # NEES per degree of freedom: a smaller increase does not matter
 
 
-ROUNDED = 0.9  # a setting of two digits stands for as much
+ROUNDED = 0.9  # ratio that is rounding, for a setting has two digits
 
 
 def stands(given: float, amount: float, setting: str) -> bool:
-    """Whether a setting, that is not the default, is there for so much."""
+    """Returns whether a setting other than the default already covers this amount."""
     return given > DEFAULTS[setting] and given >= ROUNDED * min(amount, LARGEST)
 
 
 def added_nees(messages: Sequence[Message], off_by: Callable[[Poses], Floats]) -> float:
-    """What it adds to the mean NEES of a run, a degree of freedom, if each pose is off by `off_by`:
-    (n, 6), position and attitude in its own axes.
+    """Returns the increase of a run's mean NEES per degree of freedom if each pose is off by
+    `off_by`.
+
+    `off_by` returns (n, 6), position and attitude in the poses' own axes.
     """
     found = estimate_in(messages)
     if found is None:

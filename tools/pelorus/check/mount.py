@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Does the camera look where T_CB says? A degree beside it is neither noise nor a clock: every way
-is askew by as much.
+"""Tells whether the camera's mounting T_CB is right.
+
+An error of a degree is neither noise nor a clock: the estimated path leaves the true one by that
+angle throughout.
 """
 
 from __future__ import annotations
@@ -18,13 +20,15 @@ from pelorus.se3 import Poses
 from pelorus.settings import in_force
 
 SURE = 4.5  # sigmas; of 140 drives with a right T_CB the largest are 4.4 and 4.1, with 1 degree 8
-CAMERA_TURN, TURN_MOST = "camera-turn-sigma", 0.2  # rad, that it takes
+CAMERA_TURN, TURN_MOST = "camera-turn-sigma", 0.2  # rad, largest that the setting takes
 
 
 @dataclass(frozen=True)
 class Turned:
-    """The images show the camera turned by `turn_rad` in the body's axes beside the given T_CB,
-    with this covariance. `adds`: what that adds to the mean NEES of the run, a degree of freedom.
+    """The camera is turned by `turn_rad` in the body's axes against the given T_CB.
+
+    `covariance` is that of the turn, rad^2. `adds` is what the turn adds to the run's mean NEES per
+    degree of freedom.
     """
 
     turn_rad: Floats
@@ -38,13 +42,13 @@ class Turned:
 
     @property
     def sigma_deg(self) -> float:
-        """Of the angle."""
+        """Returns the standard error of the angle, degrees."""
         axis = self.turn_rad / (np.linalg.norm(self.turn_rad) + 1e-12)
         return float(np.degrees(np.sqrt(axis @ self.covariance @ axis)))
 
     @property
     def is_off(self) -> bool:
-        """Surely, and by more than the filter says of its positions."""
+        """Returns whether the turn is significant, and larger than the filter's sigma allows."""
         d2 = self.turn_rad @ np.linalg.solve(self.covariance, self.turn_rad)
         each = float(np.linalg.norm(self.turn_rad) / np.sqrt(3.0))
         matters = self.adds > ADDS or stands(self.given, each, CAMERA_TURN)
@@ -52,12 +56,12 @@ class Turned:
 
     @property
     def beyond(self) -> float:
-        """Of the way, by which positions may be off where that is so, else 0."""
+        """Returns the position error as a share of the way if the camera is off, else 0."""
         return float(np.linalg.norm(self.turn_rad)) if self.is_off else 0.0
 
     @property
     def setting(self) -> dict[str, str]:
-        """By which the covariances contain it, where they do not."""
+        """Returns the setting with which the covariances cover the turn, if they do not."""
         each = float(np.linalg.norm(self.turn_rad) / np.sqrt(3.0))
         if not self.is_off or each <= self.given or stands(self.given, each, CAMERA_TURN):
             return {}
@@ -65,7 +69,7 @@ class Turned:
 
 
 def turned(found: Agreement, messages: Sequence[Message]) -> Turned | None:
-    """Of a run by twists."""
+    """Returns the camera's turn in a run by twists; None where it cannot be estimated."""
     if found.tilt_rad is None or found.tilt_covariance is None:
         return None
     tilt = found.tilt_rad
@@ -75,7 +79,7 @@ def turned(found: Agreement, messages: Sequence[Message]) -> Turned | None:
 
 
 def _askew(tilt: Floats, poses: Poses) -> Floats:
-    """The pose that a turned camera sees: T_0 Exp(tilt) T_0^-1 T Exp(-tilt), beside T."""
+    """Returns the error of a turned camera's pose: T_0 Exp(tilt) T_0^-1 T Exp(-tilt)."""
     at_start = poses.R[0] @ tilt
     off_W = np.cross(at_start, poses.p - poses.p[0])
     way_B, turn_B = np.einsum("nji,nj->ni", poses.R, off_W), at_start @ poses.R - tilt

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Settings as `check` passes them about, and as pelorus-replay takes them."""
+"""Settings as `check` keeps them, and as pelorus-replay takes them."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ Settings = Mapping[str, str]
 
 
 def options_of(settings: Settings) -> list[str]:
-    """As pelorus-replay takes them."""
+    """Returns the settings as arguments of pelorus-replay."""
     return [word for name, value in settings.items() for word in (f"--{name}", value)]

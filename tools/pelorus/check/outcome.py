@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""One replay, and how likely its observations were: what settings are compared by.
+"""One replay and the likelihood of its observations, by which settings are compared.
 
-Each REPORT tells d2 = y^T S^-1 y and ln det S of all innovations that the frame used, as the filter
-believed them to be distributed before it saw them. Summed over a drive that is -2 ln of the
-likelihood of what was seen, given the settings; smaller is better. An observation that the gate
-rejected counts as one that could have been anywhere in the picture: else the best settings would
-be those that reject everything.
+Each REPORT has d2 = y^T S^-1 y and ln det S of all innovations that the frame used, as predicted
+before the frame was seen. Their sum over a drive is -2 ln of the likelihood of the observations,
+given the settings; smaller is better. An observation that the gate rejected counts as one that may
+lie anywhere in the picture: otherwise the best settings would be those that reject everything.
 """
 
 from __future__ import annotations
@@ -40,12 +39,11 @@ from pelorus.replay import stuffed_answers
 from pelorus.schema import number
 from pelorus.trajectory import POSE_SIZE
 
-# While settings are compared the gate stands where an observation begins to be more likely an
-# outlier than a rare one; the usual gate cuts 1 % of the sound ones, and so would favour sigmas
-# that are too large.
+# While settings are compared the gate stands where an observation is as likely an outlier as an
+# inlier. The usual gate cuts 1 % of the inliers, and so would favour sigmas that are too large.
 GATE_D2 = "25"
 DISPARITY_SPAN_PX = 100.0
-BEGIN_NS = 1_000_000_000  # a recording may begin at zero, and its frames be too late
+BEGIN_NS = 1_000_000_000  # a recording may begin at zero; offsets must not lead below
 OFFSET_MOST_S = 0.1
 OFFSET, PART, LENGTH, SCALE = "@offset", "@part", "@frames", "@scale"
 CAMERA_OFFSET = "camera-offset"
@@ -54,25 +52,26 @@ CONTRADICTED = number("reason", "TWIST_CONTRADICTED")
 
 @dataclass(frozen=True)
 class Outcome:
-    """`cost`: -2 ln of the likelihood of a matched observation, on average."""
+    """The result of one replay. `cost` is the mean of -2 ln of an observation's likelihood."""
 
     cost: float
     matched: int
     used: int
     gated: int
     frames: int
-    nis: float  # a degree of freedom: 1 is expected
+    nis: float  # per degree of freedom: 1 is expected
     bias: Floats  # at the end, (b_v, b_w)
     bias_variance: Floats
-    contradicted: float = 0.0  # of the frames: in these vision contradicts twists or IMU
+    contradicted: float = 0.0  # share of the frames in which vision contradicts twists or IMU
     pose_log_det: float = -math.inf  # ln det of the last pose's covariance
     by_frame: Floats = field(
         default_factory=lambda: np.zeros(0)
     )  # -2 ln of each frame's likelihood
 
     def gain_over(self, other: Outcome) -> float:
-        """How much likelier this run makes what was seen: -2 ln of the ratio, over the drive. Than
-        a run that used nothing any other is likelier.
+        """Returns -2 ln of the likelihood ratio to another run, over the drive.
+
+        Against a run that used no observation, any other one is likelier.
         """
         if not (math.isfinite(self.cost) and math.isfinite(other.cost)):
             return (
@@ -87,9 +86,9 @@ NOTHING = Outcome(math.inf, 0, 0, 0, 0, math.nan, np.zeros(6), np.zeros(6))
 class Bench:
     """Replays a recording with many settings, on all processors, each set once.
 
-    Settings may hold OFFSET (the frames' times are later by so many s), PART (0 or 1: the first or
-    the second half of the drive), LENGTH (so many frames) and SCALE (the twists' velocities so many
-    times as large), which are not the filter's.
+    Settings may hold four keys of its own: OFFSET (seconds to add to the frames' times), PART (0 or
+    1: the first or the second half of the drive), LENGTH (number of frames) and SCALE (factor of
+    the twists' velocities).
     """
 
     def __init__(self, program: Path, recording: Path, folder: Path, process: str = "") -> None:
@@ -113,7 +112,7 @@ class Bench:
         return any(message.kind == kind for message in self._messages)
 
     def parts(self, offset_s: float) -> Parts:
-        """Of what is replayed here, to ask whether parts of the points tell the same motion."""
+        """Returns the recording cut into windows and halves, for comparing halves of the points."""
         messages = shifted(self._messages, round(offset_s * 1e9))
         return Parts(self._program, messages, self._folder)
 
@@ -121,7 +120,7 @@ class Bench:
         return self.run_all([settings])[0]
 
     def run_all(self, many: Sequence[Settings], what: str = "replaying") -> list[Outcome]:
-        """In their order."""
+        """Returns the outcomes in the order of the settings."""
         keys = [tuple(sorted(_by_offset(settings).items())) for settings in many]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         for key in new:
@@ -132,7 +131,7 @@ class Bench:
         return [self._known[key] for key in keys]
 
     def _recording(self, settings: Settings) -> Path:
-        """What is replayed, written when it is first wanted."""
+        """Returns the recording to replay, written at its first use."""
         asked = ((OFFSET, "0"), (PART, ""), (LENGTH, ""), (SCALE, "1"))
         key = tuple(settings.get(name, usual) for name, usual in asked)
         if key not in self._written:
@@ -157,7 +156,7 @@ class Bench:
 
 
 def _by_offset(settings: Settings) -> Settings:
-    """With camera-offset as OFFSET: a session holds 64 steps at most for a frame that is moved."""
+    """Returns camera-offset as OFFSET: a session moves a frame past at most 64 steps."""
     if CAMERA_OFFSET not in settings:
         return settings
     moved = float(settings[CAMERA_OFFSET]) + float(settings.get(OFFSET, "0"))
@@ -166,7 +165,7 @@ def _by_offset(settings: Settings) -> Settings:
 
 
 def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
-    """From a filter's REPORTs and POSEs."""
+    """Returns the outcome from a filter's REPORTs and POSEs."""
     rows, d2, matched, used, gated, contradicted = 0, 0.0, 0, 0, 0, 0
     by_frame: list[float] = []
     last: Pose | None = None
@@ -207,7 +206,7 @@ def _log_det(pose: Pose) -> float:
 
 
 def outlier_cost(header: Header, messages: Sequence[Message]) -> float:
-    """-2 ln of the density of an observation that may be anywhere: uL, v and disparity."""
+    """Returns -2 ln of the density of an observation that may be anywhere: uL, v and disparity."""
     width, height = float(header.image_width_px), float(header.image_height_px)
     if not (width and height):
         seen = [m.pixels for m in messages if isinstance(m, Stereo) and len(m.pixels)]

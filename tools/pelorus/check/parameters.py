@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The noises that are looked for: their settings, limits, and what the search begins with."""
+"""The noises to search: their settings, limits and starting values."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from pelorus.frames import Header
 from pelorus.schema import DEFAULTS
 
 AXES = "xyz"
-PAYS = 20.0  # -2 ln of the likelihood ratio that one parameter more, or another timing, must bring
-FRAMES_FEW = 100  # of fewer, what is found may be chance
-FEWER_SLOTS = 30  # landmarks while a rough answer is looked for: a third of the time
+PAYS = 20.0  # -2 ln of the likelihood ratio that a further parameter, or another timing, must gain
+FRAMES_FEW = 100  # with fewer frames the result may be chance
+FEWER_SLOTS = 30  # landmarks in a coarse search: a third of the time
 
 
 class Parameter(NamedTuple):
-    """A setting, what it is where nothing is given, its limits and the HEADER's suggestion."""
+    """A setting with its default, its limits and the HEADER's suggestion."""
 
     setting: str
     default: float
@@ -61,7 +61,7 @@ AXIS_SUGGESTIONS = {
 
 @dataclass(frozen=True)
 class Tuned:
-    """Settings to write, and why; `offset_s` is added to the frames' times."""
+    """The settings to write, and why; `offset_s` is to be added to the frames' times."""
 
     settings: dict[str, str]
     before: Outcome
@@ -72,11 +72,11 @@ class Tuned:
     of_clock: list[str] = field(default_factory=list)  # of what was said
     halves: Inflated | None = None  # None: not compared
     doubts: list[str] = field(default_factory=list)
-    lasting: list[str] = field(default_factory=list)  # what is off for longer than a step
+    lasting: list[str] = field(default_factory=list)  # errors that last longer than a step
 
 
 def unless_surer(bench: Bench, tuned: Tuned, settings: dict[str, str]) -> Tuned:
-    """The same with these settings; as it is where they make the filter surer of its last pose."""
+    """Returns `tuned` with these settings, unless they make the filter surer of its last pose."""
     after = bench.run(settings)
     if not after.pose_log_det > tuned.after.pose_log_det:
         return tuned
@@ -84,15 +84,16 @@ def unless_surer(bench: Bench, tuned: Tuned, settings: dict[str, str]) -> Tuned:
 
 
 def of_process(by_imu: bool) -> dict[str, Parameter]:
-    """All whose changes are told."""
+    """Returns all parameters of a process whose changes are reported."""
     return IMU | WALKS if by_imu else TWIST
 
 
 def starting(
     header: Header, given: Settings, parameters: Mapping[str, Parameter]
 ) -> dict[str, float]:
-    """What is set, else what the recording suggests, else the defaults; name-x, -y, -z where axes
-    differ.
+    """Returns the starting values: the given ones, else the recording's, else the defaults.
+
+    Where axes differ the keys are name-x, -y and -z.
     """
     out = {}
     for name, parameter in parameters.items():
@@ -128,7 +129,7 @@ def _within(parameter: Parameter, value: float) -> float:
 def limits(
     values: Mapping[str, float], parameters: Mapping[str, Parameter]
 ) -> dict[str, tuple[float, float]]:
-    """Of each value that is looked for."""
+    """Returns the limits (least, most) of each searched value."""
     found = {}
     for name in values:
         parameter = parameters.get(name) or parameters[name.rpartition("-")[0]]
@@ -137,7 +138,7 @@ def limits(
 
 
 def written(values: Mapping[str, float], parameters: Mapping[str, Parameter]) -> dict[str, str]:
-    """As settings: of velocity, or of velocity-x, -y, -z."""
+    """Returns the values as settings: velocity, or velocity-x, -y, -z."""
     out = {}
     for name, parameter in parameters.items():
         if name in values:
@@ -150,7 +151,7 @@ def written(values: Mapping[str, float], parameters: Mapping[str, Parameter]) ->
 def no_narrower(
     header: Header, given: Settings, found: Settings, parameters: Mapping[str, Parameter]
 ) -> dict[str, str]:
-    """The noises that were found, but none below the given one, axis by axis."""
+    """Returns the noises that were found, but on each axis none below the given one."""
     out = {}
     for name, parameter in parameters.items():
         either = [_axes(header, settings, name, parameter) for settings in (given, found)]
@@ -162,8 +163,9 @@ def no_narrower(
 
 
 def larger(header: Header, settings: Settings, by_imu: bool, times: float) -> dict[str, str]:
-    """The same with all noises so many times as large, and what is known of a twist's biases before
-    the drive: the estimate depends on their ratios. An IMU soon tells its own.
+    """Returns the settings with all noises enlarged, and with them the priors of a twist's biases.
+
+    The estimate depends on their ratios. The biases of an IMU are soon known from its data.
     """
     if times == 1:
         return dict(settings)
@@ -179,22 +181,22 @@ def larger(header: Header, settings: Settings, by_imu: bool, times: float) -> di
 
 
 def pooled(values: Mapping[str, float], name: str) -> float:
-    """One value for all axes."""
+    """Returns one value for all axes."""
     if name in values:
         return values[name]
     return float(np.exp(np.mean([np.log(values[f"{name}-{axis}"]) for axis in AXES])))
 
 
 def fewer_slots(given: Settings) -> dict[str, str]:
-    """For a rough answer."""
+    """Returns the settings for a coarse search."""
     return {"slots": str(min(int(float(given.get("slots", "100"))), FEWER_SLOTS))}
 
 
 def merged(settings: Settings) -> dict[str, str]:
-    """Without what is not the filter's."""
+    """Returns the settings without the keys of `Bench`."""
     return {k: v for k, v in settings.items() if not k.startswith("@")}
 
 
 def offset_settings(offset_s: float) -> dict[str, str]:
-    """What a robot is told of it."""
+    """Returns the clock offset as a robot's settings."""
     return {"camera-offset": f"{offset_s:.4g}"} if offset_s else {}

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Are the twists' velocities of another scale than the images? What is off by a percent all along
-is neither noise nor a clock.
+"""Tells whether the twists' velocities have another scale than the images.
 
-A wrong baseline, focal length or wheel's radius. The velocities are multiplied by some factors
-about 1, and the parabola of the likelihoods says which one fits, and how well the parts of the
-drive agree on it. Biases are free meanwhile: at constant speed they say the same as a scale, which
-then stays untold.
+A wrong baseline, focal length or wheel radius makes a constant error of percents, neither noise nor
+a clock. The velocities are multiplied by factors about 1; a parabola through the likelihoods gives
+the best one and how well the parts of the drive agree on it. Biases stay free: at constant speed a
+bias and a scale look the same, and the scale stays unknown.
 """
 
 from __future__ import annotations
@@ -27,14 +26,14 @@ from pelorus.se3 import Poses
 from pelorus.settings import in_force
 
 STEP, STEPS = 0.01, 4
-SURE = 4.0  # sigmas from which a scale is off, and not only untold
-BY_BIAS = 1.5  # times as well known without biases: then it is these that hide it
-BASELINE_MOST = 0.1  # that the setting takes
+SURE = 4.0  # sigmas from which a scale is off
+BY_BIAS = 1.5  # ratio of sigmas with and without biases, above which the biases hide the scale
+BASELINE_MOST = 0.1  # largest baseline-sigma that the setting takes
 NEAR = 2.5  # steps
 
 
 def off_by(bench: Bench, settings: Settings) -> float:
-    """What the factor that fits best has above 1; 0 where it may be 1."""
+    """Returns the best factor minus 1; 0 where the factor may be 1."""
     factors = 1 + STEP * np.arange(-STEPS, STEPS + 1)
     ran = bench.run_all([{**settings, SCALE: f"{at:.3f}"} for at in factors], "scale")
     most = max(outcome.matched for outcome in ran)
@@ -46,7 +45,7 @@ def off_by(bench: Bench, settings: Settings) -> float:
 
 
 def words(off: float) -> str:
-    """Of one that is off."""
+    """Returns the sentence for a scale that is off."""
     return (
         f"the images show about {1 + off:.2f} times the way of the twists: baseline, focal length "
         "or wheels' radius"
@@ -55,9 +54,11 @@ def words(off: float) -> str:
 
 @dataclass(frozen=True)
 class Doubt:
-    """The images show `scale` +- `sigma` times the twists' way beside biases of `bias_mps`; without
-    these it is known to `unbiased`. `adds`: what a scale that is off by `share` adds to the mean
-    NEES of the run, a degree of freedom.
+    """The scale of the images against the twists.
+
+    The images show `scale` +- `sigma` times the twists' way beside velocity biases of `bias_mps`;
+    without biases the sigma is `unbiased`. `adds` is what a scale error of `share` adds to the
+    run's mean NEES per degree of freedom.
     """
 
     scale: float
@@ -69,27 +70,26 @@ class Doubt:
 
     @property
     def share(self) -> float:
-        """Of the way, by which positions may be off."""
+        """Returns the position error as a share of the way."""
         return float(np.hypot(self.scale - 1, self.sigma))
 
     @property
     def is_untold(self) -> bool:
-        """Whether the drive tells nothing worth having: a figure of that size would say of the
-        camera what is only true of the drive.
-        """
+        """Returns whether the drive cannot measure the scale, so that no figure is meaningful."""
         return self.sigma > BASELINE_MOST
 
     @property
     def beyond(self) -> float:
-        """The same where it is more than what the filter says of its positions, or than it would
-        say without a baseline-sigma that was set for it, else 0.
+        """Returns the share if it exceeds what the filter says of its positions, else 0.
+
+        What the filter would say without its baseline-sigma counts, too.
         """
         matters = self.adds > ADDS or stands(self.given, self.share, "baseline-sigma")
         return self.share if matters and not self.is_untold else 0.0
 
     @property
     def setting(self) -> dict[str, str]:
-        """By which the covariances contain it, where they do not."""
+        """Returns the setting with which the covariances cover the scale, if they do not."""
         if self.beyond <= self.given or stands(self.given, self.share, "baseline-sigma"):
             return {}
         return {"baseline-sigma": f"{min(self.share, BASELINE_MOST):.2g}"}
@@ -100,17 +100,17 @@ class Doubt:
 
     @property
     def by_bias(self) -> bool:
-        """Is it the bias that hides it?"""
+        """Returns whether the velocity bias hides the scale."""
         return self.sigma > BY_BIAS * self.unbiased
 
 
 def bias_of(messages: Sequence[Message]) -> float:
-    """Sigma of the velocities' bias in a run, m/s; 0 where there is none."""
+    """Returns the sigma of the velocities' bias in a run, m/s; 0 where there is none."""
     return (in_force(messages, "bias-velocity-sigma") or 0.0) if in_force(messages, "bias") else 0.0
 
 
 def doubted(found: Agreement, messages: Sequence[Message]) -> Doubt:
-    """Of the scale, in a run."""
+    """Returns what a run leaves in doubt of the scale."""
     doubt = Doubt(found.scale, found.scale_sigma, bias_of(messages), found.through_zero_sigma, 0.0)
     given = in_force(messages, "baseline-sigma") or 0.0
     return replace(

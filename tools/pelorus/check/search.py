@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The settings that make what was seen most likely: a search in the logarithms of the sigmas.
+"""Searches the settings of greatest likelihood, in the logarithms of the sigmas.
 
 In each round every parameter is tried a step up and a step down, all at once on all processors.
-Three points give a parabola, and all parameters move to the feet of theirs together; the best of
-everything tried stays. Then the step shrinks.
+Three points give a parabola, and all parameters move to their vertices together; the best of
+everything tried is kept. Then the step shrinks.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from pelorus.check.options import Settings
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import Parameter, limits, written
 
-COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"  # of a rough answer
-FARTHEST = 2.0  # steps that a parabola may lead away
-WORTH_ANOTHER = 0.01  # an observation: so much from a step asks for one more
-LEAST_COST = 2e-5  # an observation: less is no improvement
+COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"  # of a coarse search
+FARTHEST = 2.0  # steps: farthest move to a vertex
+WORTH_ANOTHER = 0.01  # cost per observation: such a gain asks for another round
+LEAST_COST = 2e-5  # cost per observation: a smaller change is no improvement
 
 Build = Callable[[Mapping[str, float]], Settings]
 
 
 @dataclass(frozen=True)
-class Found:
-    """The best that was tried."""
+class BestFound:
+    """The best settings that were tried."""
 
     values: dict[str, float]
     outcome: Outcome
@@ -39,8 +39,8 @@ def search_noises(
     parameters: Mapping[str, Parameter],
     steps: Sequence[float],
     what: str = "noise",
-) -> Found:
-    """Of parameters within their limits, beside settings that stay."""
+) -> BestFound:
+    """Searches the given noises within their limits; the settings in `side` stay."""
     build = lambda v: {**side, **written(v, parameters)}  # noqa: E731 - named where it is used
     return search(bench, start, limits(start, parameters), build, steps, what)
 
@@ -52,9 +52,9 @@ def search(
     build: Build,
     steps: Sequence[float],
     what: str = "noise",
-) -> Found:
-    """From `start`, by rounds; `build` makes settings of the values, each within its limits."""
-    best = Found(dict(start), bench.run(build(start)))
+) -> BestFound:
+    """Searches from `start` in rounds; `build` makes settings of values within their limits."""
+    best = BestFound(dict(start), bench.run(build(start)))
     for round_, step in enumerate(steps):
         said = f"{what}, round {round_ + 1} of {len(steps)}"
         better = _round(bench, best, within, build, step, said)
@@ -66,12 +66,12 @@ def search(
 
 def _round(
     bench: Bench,
-    best: Found,
+    best: BestFound,
     within: Mapping[str, tuple[float, float]],
     build: Build,
     step: float,
     what: str,
-) -> Found:
+) -> BestFound:
     tried: list[dict[str, float]] = []
     for name in best.values:
         for factor in (step, 1 / step):
@@ -82,17 +82,17 @@ def _round(
         up, down = outcomes[2 * k].cost, outcomes[2 * k + 1].cost
         steps = foot(down, best.outcome.cost, up)
         moved[name] = _clipped(within[name], best.values[name] * step**steps)
-    together = Found(moved, bench.run(build(moved)))
-    singly = (Found(v, o) for v, o in zip(tried, outcomes, strict=True))
+    together = BestFound(moved, bench.run(build(moved)))
+    singly = (BestFound(v, o) for v, o in zip(tried, outcomes, strict=True))
     return min((best, together, *singly), key=lambda found: found.outcome.cost)
 
 
 def foot(down: float, middle: float, up: float) -> float:
-    """Where the parabola through (-1, down), (0, middle), (1, up) is lowest, within reason."""
+    """Returns the vertex of the parabola through (-1, down), (0, middle), (1, up), limited."""
     if not all(map(math.isfinite, (down, middle, up))):
         return 0.0
     bend = down - 2 * middle + up
-    if bend <= LEAST_COST:  # no foot: a step downhill, if there is a slope
+    if bend <= LEAST_COST:  # no minimum: a step downhill, if there is a slope
         return 0.0 if abs(up - down) <= LEAST_COST else math.copysign(1.0, down - up)
     return max(-FARTHEST, min(FARTHEST, 0.5 * (down - up) / bend))
 

@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Twist timing, clock offset, biases and noises of a recording, by what makes its observations
-likeliest.
+"""Finds twist timing, clock offset, biases and noises of a recording by maximum likelihood.
 
-A parameter more must pay: what was seen must become so much likelier that chance would not do it.
-Where the tracks drift, the likelihood of a single step is blind to what matters (tracks_noise.py):
-then pixel-sigma is the one that stands for the drift, and the twists' sigmas are as given, but no
-larger than what the images allow. Whether what comes out is better than what was given is asked
-afterwards (held.py).
+A further parameter must gain more likelihood than chance would. Where the tracks drift, the
+likelihood of single steps misses the long errors (tracks_noise.py): then pixel-sigma is the one
+that covers the drift, and the twists' sigmas stay as given, but no larger than the images allow.
+Whether the result is better than the given settings is tested afterwards (held.py).
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pelorus.check import clock, scale, tuning_imu
-from pelorus.check.biases import WIDE, told_by_halves, told_in_drift
+from pelorus.check.biases import WIDE, biases_by_halves, gyro_bias_in_drift
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, SCALE, Bench
 from pelorus.check.parameters import (
@@ -31,19 +29,21 @@ from pelorus.check.parameters import (
     starting,
     written,
 )
-from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
-from pelorus.check.tracks_noise import DRIFT, TrackNoise, told_apart, track_noise
-from pelorus.converters.twist_noise import Spread, difference_of_a_reading
+from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
+from pelorus.check.tracks_noise import DRIFT, TrackNoise, differs_clearly, track_noise
+from pelorus.converters.twist_noise import TwistSpread, difference_of_a_reading
 
-SPREAD_FRAMES = 20  # tell a spread to a fifth: enough to begin with
+SPREAD_FRAMES = 20  # enough to measure a spread to a fifth, as a start
 FINE = (1.3, 1.15)
 TWO_CLOCKS = "no timing suits velocities and rates of turn of two clocks: yours stays"
-OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
+OF_AXES = (2.0, 1.5)  # factors from one sigma for all axes to one for each
 
 
 def tune(bench: Bench, given: Settings, one_clock: bool = True) -> Tuned:
-    """`given` are the settings as they are: they hold wherever nothing better is found.
-    `one_clock`: velocities and rates of turn have the same; else no setting suits both.
+    """Finds the settings of a recording with twists.
+
+    `given` holds wherever nothing better is found. `one_clock`: velocities and rates of turn share
+    a clock; otherwise no offset suits both.
     """
     return tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given, one_clock)
 
@@ -56,10 +56,10 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
     fixed = {k: v for k, v in given.items() if not k.startswith(names)}
     fixed[OFFSET] = fixed.pop("camera-offset", "0")
     if noise.drifts:
-        fixed.pop(DRIFT, None)  # what one step tells of biases, it tells without it
+        fixed.pop(DRIFT, None)  # the biases that one step shows are estimated without drift
         found = _of_drifting_tracks(bench, fixed, start, noise)
         shared_px = noise.rows.shared_px if noise.rows is not None else 0.0
-        fixed, words = told_in_drift(bench, fixed, found.values, shared_px)
+        fixed, words = gyro_bias_in_drift(bench, fixed, found.values, shared_px)
         offset_s = float(fixed.pop(OFFSET))
         fixed |= noise.setting(given)
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
@@ -67,12 +67,12 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
     rough = fixed | WIDE | fewer_slots(given)
     values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)
     offset = clock.of_twists(bench, rough | written(values, TWIST)) if one_clock else clock.UNTOLD
-    if offset.gain > PAYS:  # what a wrong clock does is no noise
+    if offset.gain > PAYS:  # a wrong clock is not noise, so it comes first
         rough[OFFSET] = f"{offset.best_s:.6f}"
         values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, values, TWIST, COARSE).values
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
-    fixed, of_bias = told_by_halves(bench, moved, values)
+    fixed, of_bias = biases_by_halves(bench, moved, values)
     off = scale.off_by(bench, moved | written(values, TWIST))
     if one_clock:
         fixed, found, of_clock = clocked(bench, fixed, values, given, off)
@@ -88,10 +88,10 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
 
 
 def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[str, float]:
-    """From what is given, and from what the images say of the twists: the likelier of the two.
+    """Returns the likelier of two starts: the given noises, and those that the images show.
 
-    With sigmas that are far too small a filter finds contradictions all along and widens what it
-    believes, which can be the best for many steps around.
+    With sigmas that are far too small a filter finds contradictions throughout and widens its
+    covariance, which can be a local optimum many steps wide.
     """
     starts = [start]
     most = difference_of_a_reading(bench.examined, SPREAD_FRAMES)
@@ -101,8 +101,8 @@ def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[s
     return min(found, key=lambda some: some.outcome.cost).values
 
 
-def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
-    """The sigmas of the twists alone."""
+def _of_twists(start: Mapping[str, float], spread: TwistSpread) -> dict[str, float]:
+    """Returns the twists' sigmas alone, as the images show them."""
     said = {"velocity": spread.velocity_mps, "gyro": spread.gyro_radps}
     of = {name: said.get(name.partition("-")[0], 0.0) for name in start}
     return {name: value for name, value in of.items() if value > 0}
@@ -113,17 +113,17 @@ def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
 
 def _of_drifting_tracks(
     bench: Bench, fixed: Settings, start: Mapping[str, float], noise: TrackNoise
-) -> Found:
-    """The given ones, where they are not clearly off: nothing here is known better than that."""
+) -> BestFound:
+    """Keeps given sigmas unless the data contradict them; takes pixel-sigma from the tracks."""
     values = dict(start)
-    if told_apart(noise.stands_for_px, start["pixel"]):
+    if differs_clearly(noise.stands_for_px, start["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     most = difference_of_a_reading(bench.examined)
     if most is not None:
         for name, value in _of_twists(start, most).items():
-            if value < start[name] and told_apart(value, start[name]):
+            if value < start[name] and differs_clearly(value, start[name]):
                 values[name] = value
-    return Found(values, bench.run({**fixed, **written(values, TWIST)}))
+    return BestFound(values, bench.run({**fixed, **written(values, TWIST)}))
 
 
 # --- clocks ---------------------------------------------------------------------------------------
@@ -135,13 +135,14 @@ def clocked(
     values: Mapping[str, float],
     given: Settings,
     off: float = 0.0,
-) -> tuple[dict[str, str], Found, str]:
-    """Timing and the offset of the camera's clock; the noises again where they change.
+) -> tuple[dict[str, str], BestFound, str]:
+    """Returns timing and offset of the camera's clock as settings, the noises again if these
+    change, and words.
 
-    With several readings a frame the offset tells both: another timing is one of a whole reading.
-    With a single one the timings are tried; `mid` competes only if it is given, for it is the mean
-    of two readings, and would win for its smaller noise alone. `off`: so much the velocities are
-    off in scale; what that explains is no clock.
+    With several readings a frame the offset covers both: another timing is a shift by a whole
+    reading. With a single one the timings are tried; `mid` competes only if it is given, for it
+    averages two readings and would win by its smaller noise alone. `off` is the known scale error
+    of the velocities, which must not be taken for a clock.
     """
     was_s = float(given.get("camera-offset", "0"))
     timing = fixed.get("twist-timing", bench.header.twist_timing.name.lower())
@@ -168,7 +169,7 @@ def clocked(
 def _moved(
     bench: Bench, settings: Settings, offset: clock.Offset, timing: str
 ) -> tuple[dict[str, str], str]:
-    """By the offset, or by the timing that moves the readings as far."""
+    """Returns the settings with the offset, or with the timing that moves the readings as far."""
     period_s = clock.seconds(bench.examined.twist_t_ns)
     near_s = max(3 * offset.sigma_s, 0.25 * period_s)
     for name in ("start", "end"):
@@ -188,8 +189,8 @@ def _moved(
 # --- axes -----------------------------------------------------------------------------------------
 
 
-def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
-    """A sigma for each axis where that pays: two parameters more for each of the two."""
+def _axes(bench: Bench, fixed: Settings, found: BestFound) -> tuple[BestFound, str]:
+    """Returns a sigma for each axis where that pays: two parameters more for each kind."""
     split = {"pixel": found.values["pixel"]}
     for name in ("velocity", "gyro"):
         for axis in AXES:
@@ -203,10 +204,10 @@ def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
     for name in ("velocity", "gyro"):
         alike = {k: v for k, v in result.values.items() if not k.startswith(name)}
         alike |= {name: pooled(result.values, name)}
-        one = Found(alike, bench.run({**fixed, **written(alike, TWIST)}))
-        if name in found.values:  # the best for all axes that is known
+        one = BestFound(alike, bench.run({**fixed, **written(alike, TWIST)}))
+        if name in found.values:  # starts from the best value for all axes
             best = {**alike, name: found.values[name]}
-            other = Found(best, bench.run({**fixed, **written(best, TWIST)}))
+            other = BestFound(best, bench.run({**fixed, **written(best, TWIST)}))
             one = min(one, other, key=lambda some: some.outcome.cost)
         gain = result.outcome.gain_over(one.outcome)
         if gain > 2 * PAYS:

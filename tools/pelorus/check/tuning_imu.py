@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Noises, walks, timing and clock of a recording with an IMU, by what makes its frames likeliest.
+"""Finds noises, walks, timing and clock of a recording with an IMU by maximum likelihood.
 
 A wrong clock looks like noise, and small noise hides the valley in which the clock's offset lies: a
-filter that is sure of its IMU takes frames of another time for a contradiction, and widens what it
-believes. So the noises come first, as large as the wrong clock makes them, then the clock, and then
-both again.
+filter that trusts its IMU takes frames of another time for a contradiction and widens its
+covariance. So the noises come first, as large as the wrong clock makes them, then the clock, and
+then both again.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from pelorus.check.parameters import (
     starting,
     written,
 )
-from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
-from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
+from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
+from pelorus.check.tracks_noise import TrackNoise, differs_clearly, track_noise
 from pelorus.inertial_survey import scatter
 
-LOOSE = 10.0  # times the noises, while the clock is far off
+LOOSE = 10.0  # factor of the noises while the clock is far off
 MIDDLE = (2.0, 2.0, 1.5)  # the whole drive with few landmarks, once the clock is about right
 FINE = (1.5, 1.2)
 WALK_STEPS = (4.0, 2.0)
-TOLD = 9.0  # 3 sigma, to either side
+TOLD = 9.0  # -2 ln of the likelihood ratio: 3 sigma, to either side
 TOLD_FACTOR = 3.0
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
-    """`given` are the settings as they are: they hold wherever nothing better is found."""
+    """Finds the settings of a recording with an IMU; `given` holds unless others are better."""
     before = bench.run(given)
     noise = track_noise(bench.examined)
     values = start = starting(bench.header, given, IMU | WALKS)
@@ -83,8 +83,10 @@ def _settings() -> set[str]:
 def _roughly(
     bench: Bench, side: Settings, values: Mapping[str, float]
 ) -> tuple[dict[str, float], clock.Offset]:
-    """Noises and clock, in turn, with few landmarks and the drive's beginning for the noises. The
-    clock with an IMU that is believed less: else nothing is a valley but its very foot.
+    """Searches noises and clock in turn, with few landmarks.
+
+    The noises use the drive's beginning. The clock is searched with larger IMU noises, which widen
+    the valley of its cost.
     """
     short = {**side, **fewer_slots(side), LENGTH: COARSE_FRAMES}
     coarse = search_noises(bench, short, values, IMU, COARSE).values
@@ -101,10 +103,10 @@ def _roughly(
 
 
 def _clock(side: Settings, offset: clock.Offset, given: Settings) -> tuple[dict[str, str], str]:
-    """The offset that was found, if it is clearly likelier than the one that is set."""
+    """Returns the found offset, if it is clearly likelier than the given one, and words."""
     was_s = float(given.get("camera-offset", "0"))
     known = f"known to {2e3 * offset.sigma_s:.2g} ms" if np.isfinite(offset.sigma_s) else "untold"
-    # by the parabola, for a single cost depends on how many readings a frame averages, too
+    # by the parabola: a single cost depends on how many readings a frame averages
     gain = ((offset.best_s - was_s) / offset.sigma_s) ** 2
     if gain < PAYS:
         here = {**side, OFFSET: f"{was_s:.6f}"}
@@ -119,9 +121,11 @@ def _clock(side: Settings, offset: clock.Offset, given: Settings) -> tuple[dict[
 def _timing(
     bench: Bench, settings: Settings, usual: Outcome, offset: clock.Offset
 ) -> tuple[dict[str, str], Outcome, str]:
-    """Another moment of a reading is the same as another offset; what is left of it is whether the
-    mean of two readings fits better than one. That is little: only a clock that is known to a small
-    part of a reading tells it.
+    """Returns the timing of the readings, its outcome and words.
+
+    Another timing is an offset by part of a reading. It differs only in whether the mean of two
+    readings fits better than one, a small effect that shows only where the clock is known to a
+    small part of a reading.
     """
     period_s = clock.seconds(bench.examined.inertial.t_ns)
     given = settings.get("imu-timing", "mid")
@@ -150,7 +154,7 @@ def _timing(
 
 
 def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[dict[str, str], str]:
-    """How fast the biases wander, where the drive is long enough to tell."""
+    """Returns how fast the biases wander, where the drive is long enough to show it, and words."""
     quick = {**side, **fewer_slots(side)}
     found = search_noises(bench, quick, given, WALKS, WALK_STEPS)
     kept = dict(given)
@@ -169,24 +173,24 @@ def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[di
 
 
 def _scatter(bench: Bench) -> dict[str, float]:
-    """By the names of IMU; below it the filter's noise, and so the likelihood, stays as it is."""
+    """Returns the filter's own least noises by their names in IMU; lower values change nothing."""
     gyro, accel = scatter(bench.examined.inertial)
     return {"gyro": gyro, "accel": accel}
 
 
-def _at_least_scatter(bench: Bench, side: Settings, found: Found) -> Found:
-    """Of noises among which the filter makes no difference, the one that it takes."""
+def _at_least_scatter(bench: Bench, side: Settings, found: BestFound) -> BestFound:
+    """Raises noises to the filter's own least ones, below which the likelihood is constant."""
     least = _scatter(bench)
     values = {name: max(value, least.get(name, 0.0)) for name, value in found.values.items()}
     if values == found.values:
         return found
-    return Found(values, bench.run({**side, **written(values, IMU)}))
+    return BestFound(values, bench.run({**side, **written(values, IMU)}))
 
 
 def _untold(
-    bench: Bench, side: Settings, found: Found, parameters: Mapping[str, Parameter]
+    bench: Bench, side: Settings, found: BestFound, parameters: Mapping[str, Parameter]
 ) -> list[str]:
-    """The settings of which much more or much less would be about as likely."""
+    """Returns the settings for which far larger or smaller values would be about as likely."""
     out = []
     scattered = _scatter(bench) if parameters is IMU else {}
     for name, parameter in parameters.items():
@@ -207,13 +211,13 @@ def _of_drive(untold: list[str]) -> str:
 
 
 def noises(
-    bench: Bench, side: Settings, found: Found, given: Mapping[str, float]
-) -> tuple[Found, str]:
-    """The given one of each noise that the drive does not tell, if that is about as likely, and no
-    smaller: an IMU that is believed too much is the worse fault.
+    bench: Bench, side: Settings, found: BestFound, given: Mapping[str, float]
+) -> tuple[BestFound, str]:
+    """Keeps a given noise that the drive cannot measure, if it is about as likely and no smaller.
 
-    Where the frames tell the motion far better than the accelerometer does, or gravity's direction
-    as well as its noise allows, less noise or more makes what is seen no likelier.
+    Trusting an IMU too much is the worse fault. Where the frames measure the motion far better than
+    the accelerometer does, or gravity's direction as well as its noise allows, the likelihood
+    hardly depends on the noise.
     """
     untold = _untold(bench, side, found, IMU)
     for name, parameter in IMU.items():
@@ -221,7 +225,7 @@ def noises(
             values = {**found.values, name: given[name]}
             usual = bench.run({**side, **written(values, IMU)})
             if found.outcome.gain_over(usual) < PAYS:
-                found = Found(values, usual)
+                found = BestFound(values, usual)
     if not untold:
         return found, "pixel-sigma, gyro-noise and accel-noise are told by the drive"
     kept = ", ".join(f"{found.values[n]:.3g}" for n in IMU if IMU[n].setting in untold)
@@ -239,9 +243,9 @@ def _of_drifting_tracks(
     before: Outcome,
     noise: TrackNoise,
 ) -> Tuned:
-    """The IMU's noises stay as given, and the pixels' stands for the drift."""
+    """Keeps the IMU's given noises; takes the pixel-sigma that covers the tracks' drift."""
     values = dict(values)
-    if told_apart(noise.stands_for_px, values["pixel"]):
+    if differs_clearly(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     settings = {**side, **noise.setting(side), **written(values, PIXEL | IMU | WALKS)}
     offset = clock.of_imu(bench, settings | fewer_slots(settings), float(side[OFFSET]))

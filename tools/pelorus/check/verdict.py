@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Can a run be trusted, why, and what should be set otherwise? The one place where that is said:
-`check`, `try`, `report` and `explain` show what comes from here.
+"""Judges a run: can it be trusted, why, and what should be set otherwise?
 
-It is made of what the recording tells by itself (known.py), of what the filter said of itself in
-this run, and of the recording's truth where it has one. The same run has the same verdict, whoever
-asks.
+This is the one place that says so: `check`, `try`, `report` and `explain` show what comes from
+here. The verdict rests on what the recording shows by itself (known.py), on what the filter said of
+itself in this run, and on the recording's truth where it has one. The same run has the same verdict
+in every command.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from enum import IntEnum
 import numpy as np
 
 from pelorus.arrivals import late_ones
-from pelorus.check.calibration import Calibration, calibration
+from pelorus.check.calibration import CalibrationDoubts, calibration
 from pelorus.check.estimated import Estimated, estimated
 from pelorus.check.known import Known, known_of
 from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned
 from pelorus.check.scale import Doubt
-from pelorus.check.tracks_noise import DRIFT, told_apart
+from pelorus.check.tracks_noise import DRIFT, differs_clearly
 from pelorus.evaluation import judge
 from pelorus.faults.mend import BEHIND, CANNOT, known_words
 from pelorus.frame_table import BIASES, FrameTable, frame_table
@@ -39,22 +39,22 @@ LATE = number("status", "LATE")
 TOLD_APART = number("reason", "NO_TWISTS") | number("reason", "BIAS_OFF_PRIOR")
 NOT_POSITIVE = number("reason", "NOT_POSITIVE")
 GOOD_MOST, DOUBTED_HALF, LOST_MANY = 0.95, 0.5, 0.1  # of the frames
-GATED_USUAL = 0.01  # of right matches, by the gate's own level
-GATED_MANY, GATED_MOST = 0.05, 0.3  # of the matches
+GATED_USUAL = 0.01  # share of inliers outside the gate, by its level
+GATED_MANY, GATED_MOST = 0.05, 0.3  # share of the matches
 WINDOW_S = 5.0
-WORSE = 3.0  # times the usual share of a window that is worth naming
+WORSE = 3.0  # ratio to the usual share from which a window is reported
 NIS_LOW, NIS_HIGH = 0.6, 1.6
-NEES_HIGH, NEES_BAD = 2.0, 9.0  # a degree of freedom: errors three times as large as it says
-TRUTH_FEW = 20  # frames: the NEES of fewer says nothing
+NEES_HIGH, NEES_BAD = 2.0, 9.0  # per degree of freedom: errors three times as large as their sigma
+TRUTH_FEW = 20  # the NEES of fewer frames means nothing
 BIAS_SIGMAS, BIAS_SIGMAS_BAD = 3.0, 10.0
-FEW_USED = 8.0  # a frame
+FEW_USED = 8.0  # observations a frame
 SHARE_MANY = 0.01  # of the way, that a bias may hide
 PIXEL = "pixel-sigma"
 REASONS_TOLD = 3  # on a terminal
 
 
 class Grade(IntEnum):
-    """From good to bad."""
+    """Grades, from good to bad."""
 
     GOOD = 0
     CARE = 1
@@ -73,9 +73,7 @@ NOISES = "`pelorus check` on the recording writes noises that fit"
 
 @dataclass(frozen=True)
 class Remark:
-    """One thing that was looked at. A note tells of the search for settings, not of the run: it
-    decides nothing.
-    """
+    """A finding with its grade; a note is about the search and does not affect the verdict."""
 
     grade: Grade
     text: str
@@ -88,8 +86,10 @@ class Remark:
 
 @dataclass(frozen=True)
 class Verdict:
-    """`share`: of the way, by which positions may be off, if more than the settings say. `settings`
-    that the recording itself asks for; `noises` are beside what was seen, which `check` can mend.
+    """The verdict on a run.
+
+    `share`: position error as a share of the way, if more than the settings say. `settings`: those
+    that the recording itself asks for. `noises`: remarks on noises that `check` can mend.
     """
 
     grade: Grade
@@ -104,7 +104,7 @@ class Verdict:
 
     @property
     def words(self) -> str:
-        """No better than what the drive can tell."""
+        """Returns the verdict in words."""
         told = self.share > 0 and self.grade is not Grade.BAD
         words = VERDICTS[self.grade]
         return f"{words}, to {self.share:.1%} of the way" if told else words
@@ -115,13 +115,13 @@ class Verdict:
 
     @property
     def doubts(self) -> list[str]:
-        """Why it is not better, the worst first."""
+        """Returns the reasons against a better grade, the worst first."""
         odd = [remark for remark in self.remarks if remark.grade and not remark.is_note]
         return [remark.text for remark in sorted(odd, key=lambda remark: -remark.grade)]
 
     @property
     def to_set(self) -> list[str]:
-        """What to set, in words."""
+        """Returns the settings to change, in words."""
         lines = [f"{name} = {value}" for name, value in self.settings.items()]
         said = [f"set {'; '.join(lines)}"] if lines else []
         if self.noises and not self.is_stopped:
@@ -129,7 +129,7 @@ class Verdict:
         return said
 
     def json(self) -> dict[str, object]:
-        """The same names in every command."""
+        """Returns the verdict as JSON, with the same names in every command."""
         return {
             "verdict": self.words,
             "grade": self.mark,
@@ -138,7 +138,7 @@ class Verdict:
         }
 
     def lines(self) -> list[str]:
-        """For a terminal."""
+        """Returns the verdict as lines for a terminal."""
         doubts = self.doubts
         hidden = [f"and {len(doubts) - REASONS_TOLD} more"] * (len(doubts) > REASONS_TOLD)
         why = [f"   {words}" for words in (*doubts[:REASONS_TOLD], *hidden)]
@@ -146,7 +146,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Run:
+class JudgedRun:
     """A whole replay with one set of settings."""
 
     messages: Sequence[Message]
@@ -154,7 +154,7 @@ class Run:
     health: TimeLine
 
     @classmethod
-    def of(cls, messages: Sequence[Message]) -> Run:
+    def of(cls, messages: Sequence[Message]) -> JudgedRun:
         return cls(messages, frame_table(messages), time_line(messages) or TimeLine(0, {}, ()))
 
     @property
@@ -167,8 +167,10 @@ class Run:
 
     @property
     def doubted_share(self) -> float:
-        """Frames that are not good for more than a pause of the readings or a bias off its prior:
-        these are graded by themselves, and what is not known in a pause is in the covariance.
+        """Returns the share of frames doubted for other reasons than a pause or a bias off its
+        prior.
+
+        Those two are graded by themselves, and the covariance covers a pause.
         """
         frames = (m for m in self.messages if isinstance(m, Report) and m.subject == Kind.STEREO)
         known = TOLD_APART | HARMLESS | NOT_STARTED
@@ -188,24 +190,24 @@ class Run:
 
     @property
     def nis(self) -> float:
-        """Of all innovations of a frame together, a degree of freedom: 1 is expected."""
+        """Returns the NIS of all innovations per degree of freedom: 1 is expected."""
         rows = self.frames["innovation_rows"].sum()
         return float(self.frames["innovation_d2"].sum() / rows) if rows else float("nan")
 
 
 def verdict_of_log(messages: Sequence[Message]) -> Verdict:
-    """Of a filter's result with the recording in it, whatever numbers stand in that."""
+    """Judges a filter's result that contains the recording; no value in it raises an error."""
     with np.errstate(all="ignore"):
-        run = Run.of(messages)
+        run = JudgedRun.of(messages)
         try:
             return verdict_of(run, known_of(messages))
-        except np.linalg.LinAlgError:  # nothing can be fitted to the recording: the run alone
+        except np.linalg.LinAlgError:  # nothing can be fitted: judges the run alone
             return verdict_of(run, Known())
 
 
-def verdict_of(run: Run | None, known: Known) -> Verdict:
-    """A run is not looked at where a fault of the recording must be mended first."""
-    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.told) for f in known.faults]
+def verdict_of(run: JudgedRun | None, known: Known) -> Verdict:
+    """Judges a run. It is not examined where a fault of the recording must be mended first."""
+    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.sentence) for f in known.faults]
     agreed = known.judged.agreed
     if known.is_stopped or run is None:
         told = BEHIND if agreed is None else f"{known_words(agreed)}; {CANNOT}"
@@ -221,7 +223,7 @@ def verdict_of(run: Run | None, known: Known) -> Verdict:
     return Verdict(overall(found), tuple(found), camera.share, settings, nis_off)
 
 
-def _of_run(run: Run, known: Known) -> Iterator[Remark]:
+def _of_run(run: JudgedRun, known: Known) -> Iterator[Remark]:
     yield from of_length(run.health.frames)
     yield from _diverged(run)
     yield from _health(run)
@@ -235,18 +237,18 @@ def _of_run(run: Run, known: Known) -> Iterator[Remark]:
 
 
 def of_search(tuned: Tuned) -> list[Remark]:
-    """Notes of the search for settings."""
+    """Returns the notes of the search for settings."""
     said = [*_halves(tuned), *tuned.doubts, *tuned.said]
     return [Remark(Grade.GOOD, words, is_note=True) for words in said]
 
 
 def overall(found: Sequence[Remark]) -> Grade:
-    """As the worst of them."""
+    """Returns the worst of the remarks' grades."""
     return max((remark.grade for remark in found if not remark.is_note), default=Grade.GOOD)
 
 
 def of_length(frames: int) -> Iterator[Remark]:
-    """What so few frames cannot tell."""
+    """Yields a remark where the drive is too short to judge."""
     if frames < FRAMES_FEW:
         yield Remark(
             Grade.CARE,
@@ -255,8 +257,8 @@ def of_length(frames: int) -> Iterator[Remark]:
         )
 
 
-def _health(run: Run) -> Iterator[Remark]:
-    """Frames before an IMU's start are not counted: they are no loss."""
+def _health(run: JudgedRun) -> Iterator[Remark]:
+    """Yields remarks on lost and doubted frames; those before an IMU's start are not lost."""
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
     if run.lost_share > LOST_MANY or run.doubted_share > DOUBTED_HALF:
         grade = Grade.BAD
@@ -272,16 +274,16 @@ def _health(run: Run) -> Iterator[Remark]:
         )
 
 
-def _order(run: Run) -> Iterator[Remark]:
-    """Where the recording is not in the order of time, and no twist-delay puts it there."""
+def _order(run: JudgedRun) -> Iterator[Remark]:
+    """Yields a remark where times go back, and no twist-delay mends it."""
     refused = [m.subject for m in run.messages if isinstance(m, Report) and m.status == LATE]
     for late in late_ones(run.messages):
         if refused.count(late.kind):
             yield Remark(Grade.BAD, late.words)
 
 
-def _diverged(run: Run) -> Iterator[Remark]:
-    """A variance that is not positive is arithmetic that failed: nothing is worse."""
+def _diverged(run: JudgedRun) -> Iterator[Remark]:
+    """Yields a remark where a variance is not positive: the arithmetic failed."""
     frames = run.frames.t_ns[(run.frames.reasons & NOT_POSITIVE) != 0]
     if len(frames):
         first_s = (int(frames[0]) - run.origin_ns) * 1e-9
@@ -292,8 +294,8 @@ def _diverged(run: Run) -> Iterator[Remark]:
         )
 
 
-def _truth(run: Run) -> Iterator[Remark]:
-    """Whether the error is what the covariance says, where the recording knows the true poses."""
+def _truth(run: JudgedRun) -> Iterator[Remark]:
+    """Yields a remark on whether the errors match the covariance, where the truth is known."""
     if truth_in(run.messages) is None:
         return
     figures = judge(run.messages)
@@ -306,8 +308,8 @@ def _truth(run: Run) -> Iterator[Remark]:
     yield Remark(grade, words)
 
 
-def _gate(run: Run) -> Iterator[Remark]:
-    """The share, and where in the drive it is far above the usual."""
+def _gate(run: JudgedRun) -> Iterator[Remark]:
+    """Yields a remark on the share of gated matches, and where it is far above the usual."""
     share = run.gated_share
     grade = Grade.BAD if share > GATED_MOST else Grade.CARE if share > GATED_MANY else Grade.GOOD
     words = f"the gate rejects {share:.1%} of the matches"
@@ -319,7 +321,7 @@ def _gate(run: Run) -> Iterator[Remark]:
     yield Remark(grade, words)
 
 
-def _worst_window(run: Run, origin_ns: int) -> tuple[float, float, float] | None:
+def _worst_window(run: JudgedRun, origin_ns: int) -> tuple[float, float, float] | None:
     t = (run.frames.t_ns - origin_ns) * 1e-9
     if not len(t):
         return None
@@ -333,14 +335,14 @@ def _worst_window(run: Run, origin_ns: int) -> tuple[float, float, float] | None
     return float(t[0] + k * WINDOW_S), float(t[0] + (k + 1) * WINDOW_S), float(shares[k])
 
 
-def _used(run: Run) -> Iterator[Remark]:
+def _used(run: JudgedRun) -> Iterator[Remark]:
     used = float(np.median(run.frames["used"]))
     if used < FEW_USED:
         yield Remark(Grade.CARE, f"only {used:.0f} observations of a frame are used (median)")
 
 
-def _nis(run: Run, known: Known) -> Iterator[Remark]:
-    """More than the settings say is a doubt; less is none, for what lasts is in the noises, too."""
+def _nis(run: JudgedRun, known: Known) -> Iterator[Remark]:
+    """Yields a remark where the NIS exceeds 1; noises that cover lasting errors make it smaller."""
     if not np.isfinite(run.nis):
         return
     words = f"what frames show differs from what was expected (innovations) by {run.nis:.2f} times "
@@ -353,8 +355,8 @@ def _nis(run: Run, known: Known) -> Iterator[Remark]:
         yield Remark(Grade.CARE, f"{words}: the noise is not what these settings describe")
 
 
-def _biases(run: Run) -> Iterator[Remark]:
-    """Against their priors: beyond 3 sigma stereo and odometry disagree in something else."""
+def _biases(run: JudgedRun) -> Iterator[Remark]:
+    """Yields remarks on biases beyond 3 sigma of their priors: stereo and odometry disagree."""
     by_imu = run.frames.by_imu
     if not (by_imu or in_force(run.messages, "bias")):
         return
@@ -373,7 +375,7 @@ def _biases(run: Run) -> Iterator[Remark]:
             )
 
 
-def _tracks(run: Run, known: Known) -> Iterator[Remark]:
+def _tracks(run: JudgedRun, known: Known) -> Iterator[Remark]:
     noise = known.noise
     if noise is None:
         return
@@ -397,8 +399,8 @@ def _tracks(run: Run, known: Known) -> Iterator[Remark]:
     )
 
 
-def _for_tracks(run: Run, known: Known) -> dict[str, str]:
-    """Settings that stand for what the tracks show, where those of the run do not."""
+def _for_tracks(run: JudgedRun, known: Known) -> dict[str, str]:
+    """Returns the settings that cover what the tracks show, where those of the run do not."""
     noise = known.noise
     if noise is None or not noise.drifts:
         return {}
@@ -406,18 +408,22 @@ def _for_tracks(run: Run, known: Known) -> dict[str, str]:
     told = noise.setting({DRIFT: was, "model": _model(run)})
     told = {} if told.get(DRIFT) == was else told
     pixel_px = in_force(run.messages, PIXEL)
-    if pixel_px and noise.stands_for_px > pixel_px and told_apart(noise.stands_for_px, pixel_px):
+    if (
+        pixel_px
+        and noise.stands_for_px > pixel_px
+        and differs_clearly(noise.stands_for_px, pixel_px)
+    ):
         told[PIXEL] = f"{noise.stands_for_px:.3g}"
     return told
 
 
-def _model(run: Run) -> str:
+def _model(run: JudgedRun) -> str:
     model = in_force(run.messages, "model")
     return "" if model is None else SETTINGS[IDS["model"]].words[int(model)]
 
 
 def _halves(tuned: Tuned) -> Iterator[str]:
-    """Whether parts of the points tell the same motion."""
+    """Yields what comparing halves of the points gave."""
     found = tuned.halves
     if found is None or not np.isfinite(found.before.ratio):
         return
@@ -436,8 +442,8 @@ def _halves(tuned: Tuned) -> Iterator[str]:
     yield words
 
 
-def of_calibration(found: Calibration, own: Estimated | None = None) -> Iterator[Remark]:
-    """What images and twists together say of the camera; `own`: what the filter estimates of it."""
+def of_calibration(found: CalibrationDoubts, own: Estimated | None = None) -> Iterator[Remark]:
+    """Yields what images and twists show of the camera; `own` is the filter's estimate of it."""
     if found.scale is not None:
         yield from of_scale(found.scale)
     if own is not None:
@@ -447,7 +453,7 @@ def of_calibration(found: Calibration, own: Estimated | None = None) -> Iterator
 
 
 def of_turn(found: Turned) -> Iterator[Remark]:
-    """Whether the camera looks where T_CB says."""
+    """Yields a remark on whether the camera's mounting is right."""
     if not found.is_off:
         return
     words = f"the camera looks {found.angle_deg:.1f} +- {found.sigma_deg:.1f} degrees beside where "
@@ -458,7 +464,7 @@ def of_turn(found: Turned) -> Iterator[Remark]:
 
 
 def of_scale(doubt: Doubt) -> Iterator[Remark]:
-    """What is known of the stereo pair's scale is what the twists confirm."""
+    """Yields a remark on how well the twists confirm the stereo scale."""
     if doubt.is_untold:
         yield Remark(
             Grade.CARE,

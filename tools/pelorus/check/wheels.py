@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Wheels beside an IMU against what pictures and IMU say without them: their scale, and for wheels
-apart their distance.
+"""Compares wheels beside an IMU with what pictures and IMU give without them: scale and track.
 
 A wheel at l on the body reads r = s (v_x + l_z w_y - l_y w_z) along the body's x. The filter's v
-and w, without the wheels, explain it by least squares; leaving out one stretch of the drive after
-the other says how sure the numbers are.
+and w, estimated without the wheels, explain r by least squares; leaving out stretches of the drive
+in turn gives the standard errors.
 """
 
 from __future__ import annotations
@@ -24,18 +23,18 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.replay import replayed
 
-STRETCHES = 10  # of the drive; one after the other is left out
-LEAST = 200  # readings that move: fewer are no drive
+STRETCHES = 10  # of the drive, left out in turn
+LEAST = 200  # moving readings that a fit needs
 MOVING_MPS = 0.05
-PAUSE_S = 0.3  # across which no velocity is interpolated
+PAUSE_S = 0.3  # no velocity is interpolated across a longer gap
 SIGMAS = 4.0
 OFF_LEAST = 0.005  # of the scale: no baseline is known better
-APART_LEAST = 0.02  # of a place, likewise
-SCATTER_MOST = 2.0  # times what a reading's sigma says
+APART_LEAST = 0.02  # of a wheel's place, likewise
+SCATTER_MOST = 2.0  # factor of a reading's sigma
 
 
 class Fitted(NamedTuple):
-    """With sigmas: the scale, where it sits to the left, m, and the scatter over what was told."""
+    """The fit of a wheel, with sigmas: its scale, its place to the left, m, and its scatter."""
 
     scale: float
     scale_sigma: float
@@ -45,7 +44,7 @@ class Fitted(NamedTuple):
 
 
 def remarks(program: Path, messages: Sequence[Message], settings: Settings) -> list[Remark]:
-    """What is to be told of them; nothing of a recording that has none."""
+    """Returns the remarks on the wheels; none for a recording that has none."""
     wheels = [m for m in messages if isinstance(m, Reading) and _is_ahead(m)]
     if not wheels:
         return []
@@ -58,7 +57,7 @@ def remarks(program: Path, messages: Sequence[Message], settings: Settings) -> l
         own = [m for m in wheels if tuple(m.at_B_m.tolist()) == at]
         name = f"the wheel at y = {at[1]:g} m" if len(places) > 1 else "the wheels"
         fitted = _fitted(own, poses, len(places) > 1)
-        found += [] if fitted is None else _told(name, fitted, at[1], len(places) > 1)
+        found += [] if fitted is None else _remarks_on(name, fitted, at[1], len(places) > 1)
     return found
 
 
@@ -67,7 +66,7 @@ def _is_ahead(reading: Reading) -> bool:
 
 
 def _fitted(wheels: Sequence[Reading], poses: Sequence[Pose], apart: bool) -> Fitted | None:
-    """Each number's sigma is that of the jackknife. None where too little moves."""
+    """Fits scale and place, with jackknife sigmas; None where too few readings move."""
     read = np.array([m.value[0] for m in wheels])
     sigma = np.array([m.sigma[0] for m in wheels])
     at_B_m = wheels[0].at_B_m
@@ -98,7 +97,7 @@ def _solved(columns: Floats, read: Floats) -> Floats:
 
 
 def _between(t_ns: Times, poses: Sequence[Pose]) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Velocities at these times, and where they are known."""
+    """Returns the velocities interpolated at these times, and a mask of where they are known."""
     own = np.array([m.t_ns for m in poses], np.int64)
     if len(own) < 2:
         return np.zeros((len(t_ns), 3)), np.zeros((len(t_ns), 3)), np.zeros(len(t_ns), bool)
@@ -110,7 +109,7 @@ def _between(t_ns: Times, poses: Sequence[Pose]) -> tuple[Floats, Floats, NDArra
     return found[:, :3], found[:, 3:], there & (np.diff(seconds)[after - 1] <= PAUSE_S)
 
 
-def _told(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
+def _remarks_on(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
     more, sure = found.scale - 1, found.scale_sigma
     words = f"{name}: against pictures and IMU the speed is {more:+.1%} off, sigma {sure:.1%}"
     if abs(more) > max(SIGMAS * sure, OFF_LEAST):
@@ -118,13 +117,13 @@ def _told(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
         how = (
             f"{words}: the radius is {which} than was told (divide the speed by {found.scale:.3f})"
         )
-        told = [Remark(Grade.CARE, how)]
+        about = [Remark(Grade.CARE, how)]
     else:
-        told = [Remark(Grade.GOOD, words)]
+        about = [Remark(Grade.GOOD, words)]
     if apart:
         off_m, sigma = found.left_m - left_m, found.left_sigma_m
         if abs(off_m) > max(SIGMAS * sigma, APART_LEAST * abs(left_m)):
-            told.append(
+            about.append(
                 Remark(
                     Grade.CARE,
                     f"{name}: by its readings it sits at y = {found.left_m:.3f} m, sigma "
@@ -132,11 +131,11 @@ def _told(name: str, found: Fitted, left_m: float, apart: bool) -> list[Remark]:
                 )
             )
     if found.scatter > SCATTER_MOST:
-        told.append(
+        about.append(
             Remark(
                 Grade.CARE,
                 f"{name}: readings scatter by {found.scatter:.1f} times their sigma: tell a "
                 "larger one",
             )
         )
-    return told
+    return about

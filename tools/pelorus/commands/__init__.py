@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""One file a command, with an `app` that has it."""
+"""One file for each command, with an `app` that has it."""

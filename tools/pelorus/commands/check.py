@@ -81,9 +81,7 @@ def _write(
     pictures: Path | None,
     calibration: list[Path],
 ) -> None:
-    """With curves of a run with the settings that were found; without them, where a fault stopped
-    the search.
-    """
+    """Writes the page, with curves of a run with the found settings, if there are any."""
     from pelorus import wire  # noqa: PLC0415
     from pelorus.check.options import options_of  # noqa: PLC0415
     from pelorus.explain import explain  # noqa: PLC0415

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words that options take, and what they stand for."""
+"""Words that options take, and their values."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class TimingOrAuto(StrEnum):
 
 
 def replay_options(config: Path | None, settings: list[str], hint: str = "--set") -> list[str]:
-    """What --config and NAME=VALUE become on the command line of pelorus-replay."""
+    """Returns --config and NAME=VALUE as options of pelorus-replay."""
     options = [] if config is None else ["--config", str(config)]
     for setting in settings:
         name, equals, value = setting.partition("=")
@@ -87,7 +87,7 @@ def replay_options(config: Path | None, settings: list[str], hint: str = "--set"
 
 
 def settings_given(config: Path | None, settings: list[str]) -> dict[str, str]:
-    """A config file and NAME=VALUE as one: what is said later holds."""
+    """Returns a config file and NAME=VALUE as one dictionary; later ones override earlier ones."""
     given = {}
     if config is not None:
         for number, line in enumerate(read_text(config).splitlines(), 1):
@@ -106,7 +106,7 @@ def settings_given(config: Path | None, settings: list[str]) -> dict[str, str]:
 
 
 def _require_words(name: str, value: str, config: Path | None) -> None:
-    """Refuse a word that a setting of words does not have; the replay judges the numbers."""
+    """Refuses a word that a setting of words does not have; the replay checks numbers."""
     setting = schema.SETTINGS[IDS[name]] if name in IDS else None
     if setting is None or not setting.words:
         return

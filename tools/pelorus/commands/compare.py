@@ -13,8 +13,8 @@ from pelorus.commands.choices import PROGRAMS
 from pelorus.console import err, out, print_json
 from pelorus.errors import PelorusError
 from pelorus.flight import flight_json
-from pelorus.flight.difference import Difference, Sizes
-from pelorus.flight.judge import Desk, Judgement, Verdict, judge, of_this_version, verdict_of
+from pelorus.flight.difference import Difference, PoseDistance
+from pelorus.flight.judge import BitsVerdict, Desk, Judgement, judge, of_this_version, verdict_of
 from pelorus.flight.log import NOWHERE, Frame, read_log
 from pelorus.frames import Config
 from pelorus.replay import find_programs
@@ -69,8 +69,8 @@ def compare(
         verdict = compare_log(log, programs, start, load_state, as_json)
     except PelorusError as error:
         err.print(f"[bold red]error:[/] {escape(str(error))}")
-        verdict = Verdict.NOT_COMPARABLE
-    if verdict is not Verdict.SAME:
+        verdict = BitsVerdict.NOT_COMPARABLE
+    if verdict is not BitsVerdict.SAME:
         raise typer.Exit(verdict)
 
 
@@ -80,8 +80,8 @@ def compare_log(
     start: str | None = None,
     state: Path | None = None,
     as_json: bool = False,
-) -> Verdict:
-    """Tell what differs, and how it ends."""
+) -> BitsVerdict:
+    """Prints the differences, and returns the verdict."""
     desk = Desk(find_programs(programs), start, state)
     with err.status(f"reading {escape(str(path))}"):
         log = read_log(path)
@@ -195,7 +195,7 @@ def _said(robot: Frame) -> str:
     )
 
 
-def _sizes(sizes: Sizes) -> str:
+def _sizes(sizes: PoseDistance) -> str:
     return (
         f"{sizes.position_m:.3g} m, {sizes.angle_deg:.3g} deg, "
         f"covariance {sizes.covariance:.3g} of the variances"
@@ -220,14 +220,14 @@ def _seconds(t_ns: int) -> str:
     return f"{t_ns // 10**9}.{t_ns % 10**9:09d}"
 
 
-def _conclude(judgements: Sequence[Judgement]) -> Verdict:
+def _conclude(judgements: Sequence[Judgement]) -> BitsVerdict:
     verdict = verdict_of(judgements)
     same = sum(judgement.same for judgement in judgements)
     frames = sum(len(judgement.part.frames) for judgement in judgements)
     told = {
-        Verdict.SAME: "[bold green]the same bits[/]",
-        Verdict.DIFFERENT: "[bold red]different[/]",
-        Verdict.NOT_COMPARABLE: "[bold yellow]cannot be compared to the end[/]",
+        BitsVerdict.SAME: "[bold green]the same bits[/]",
+        BitsVerdict.DIFFERENT: "[bold red]different[/]",
+        BitsVerdict.NOT_COMPARABLE: "[bold yellow]cannot be compared to the end[/]",
     }[verdict]
     out.print(f"{told}: {same} of {frames} frames are the same to the bit")
     return verdict

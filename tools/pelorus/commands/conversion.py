@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every converter, and the simulation, says of the recording that it made."""
+"""The output that every converter and the simulation have in common."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pelorus.recording import Recording
 
 
 def _verdict(finding: Finding) -> str:
-    if not finding.told:
+    if not finding.is_conclusive:
         return "[yellow]cannot tell[/]"
     if finding.measured:
         return "[green]measured[/]"
@@ -23,7 +23,7 @@ def _verdict(finding: Finding) -> str:
 
 
 def write(recording: Recording, findings: list[Finding], target: Path) -> None:
-    """Say what was found, keep it in the recording as TEXT, and write the file."""
+    """Prints the findings, keeps them in the recording as TEXT, and writes the file."""
     for finding in findings:
         out.print(f"{finding.subject}: {_verdict(finding)}: {escape(finding.evidence)}")
         out.print(f"    -> {escape(finding.action)}")

@@ -101,7 +101,7 @@ def klt(
 
 
 def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option for each small sensor's file, which it gets by name."""
+    """Returns the command with an option for each small sensor's file, which it gets by name."""
     options = [
         inspect.Parameter(
             sensor.name,

@@ -81,7 +81,7 @@ def course(
             subject,
             reference,
             found_programs,
-            trial.Options(ours, changed),
+            trial.TrialOptions(ours, changed),
             made(folder / "runs" / bare_name(subject.path)),
         )
         for (subject, reference), ours in zip(pairs, options, strict=True)
@@ -111,7 +111,7 @@ def _options(configs: list[Path], settings: list[str], recordings: list[Path]) -
 def _references(
     subjects: list[Subject], truth: Path | None, road_file: Path | None
 ) -> list[tuple[Subject, Reference]]:
-    """Each recording with what it is held against."""
+    """Returns each recording with its reference."""
     from pelorus.course.trial import Reference  # noqa: PLC0415 - as above
 
     if truth is not None and road_file is not None:
@@ -159,7 +159,7 @@ def _publish(trials: list[Trial], folder: Path) -> None:
 
 
 def _draw(trials: list[Trial], folder: Path) -> tuple[str, ...]:
-    """The files of the figures."""
+    """Returns the files of the figures."""
     if missing := figures_missing():
         err.print(escape(f"the table comes without figures: {missing}"))
         return ()

@@ -149,15 +149,15 @@ def _doubts(
     tolerance_ns: int,
     replayed: bool,
 ) -> list[str]:
-    """Whether one of the two may have been misread; what the filter itself says is as it is."""
+    """Returns doubts whether one of the two was misread; the filter's own result is not doubted."""
     here, there = match(mine[1], reference, tolerance_ns)
     name = f"the truth in {mine[0]}" if truth is None else str(truth)
-    a = misread.Named(str(mine[0]), mine[1].poses.at(here))
-    return misread.doubts(a, misread.Named(name, reference.poses.at(there)), replayed)
+    a = misread.NamedPoses(str(mine[0]), mine[1].poses.at(here))
+    return misread.doubts(a, misread.NamedPoses(name, reference.poses.at(there)), replayed)
 
 
 def _until(reference: Trajectory, estimate: Trajectory, first_s: float) -> Trajectory:
-    """The reference of that time alone."""
+    """Returns the reference of that time alone."""
     if not first_s:
         return reference
     early = reference.t_ns - estimate.t_ns[0] <= round(first_s * 1e9)
@@ -170,7 +170,7 @@ def _require_something(
     theirs: tuple[Path, Trajectory],
     messages: list[Message],
 ) -> None:
-    """Of the poses, or where they were given of the map."""
+    """Refuses a comparison without common poses, or without landmarks where poses were given."""
     if evaluation.is_mapping(messages):
         if not found["map_landmarks"]:
             raise PelorusError(

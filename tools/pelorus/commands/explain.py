@@ -88,7 +88,7 @@ def _write(
 ) -> None:
     from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
     from pelorus.report import answers  # noqa: PLC0415
-    from pelorus.report.beside import Told, drift_table, side_by_side  # noqa: PLC0415
+    from pelorus.report.beside import NamedLog, drift_table, side_by_side  # noqa: PLC0415
     from pelorus.report.curves import Curves  # noqa: PLC0415
     from pelorus.report.footage import footage  # noqa: PLC0415
     from pelorus.report.page import write  # noqa: PLC0415
@@ -96,13 +96,13 @@ def _write(
     facts = ""
     if other is None:
         curves = Curves(messages)
-        first = Told(name, found, curves.accuracy, messages)
+        first = NamedLog(name, found, curves.accuracy, messages)
         tables = drift_table([first])
     else:
         there = Curves(other[1])
         curves = Curves(messages, beside=there)
-        first = Told(name, found, curves.accuracy, messages)
-        second = Told(other[0], explained(other[1]), there.accuracy, other[1])
+        first = NamedLog(name, found, curves.accuracy, messages)
+        second = NamedLog(other[0], explained(other[1]), there.accuracy, other[1])
         tables = [*side_by_side(first, second), *drift_table([first, second])]
         facts = f"Dashed curves are those of {other[0]}."
     answer = answers.of_explanation(found, name, tables, facts)

@@ -21,12 +21,12 @@ app = typer.Typer()
 
 
 def _has(*names: str) -> Callable[[Path], bool]:
-    """Whether a folder holds one of them."""
+    """Returns a test whether a folder holds one of these names."""
     return lambda source: source.is_dir() and any((source / name).exists() for name in names)
 
 
 def _archive_with(name: str) -> Callable[[Path], bool]:
-    """Whether a .npz holds this array."""
+    """Returns a test whether a .npz holds this array."""
 
     def holds(source: Path) -> bool:
         if source.suffix != ".npz" or not zipfile.is_zipfile(source):
@@ -37,7 +37,7 @@ def _archive_with(name: str) -> Callable[[Path], bool]:
     return holds
 
 
-# What a source is, by what is in it, and what `pelorus convert` calls it. The first counts.
+# Formats of `pelorus convert`, each with a test of the content. The first that holds counts.
 FORMATS: tuple[tuple[str, str, Callable[[Path], bool]], ...] = (
     ("ros", f"a bag ({', '.join(BAGS)})", lambda source: source.suffix in BAGS),
     ("ros", "a bag's folder (metadata.yaml)", _has("metadata.yaml")),
@@ -49,7 +49,7 @@ FORMATS: tuple[tuple[str, str, Callable[[Path], bool]], ...] = (
 
 
 def _format_of(source: Path) -> str:
-    """What `pelorus convert` calls it; empty for a recording."""
+    """Returns the format's name in `pelorus convert`; empty for a recording."""
     if source.is_file() and source.name.endswith(RECORDINGS):
         return ""
     for name, _, fits in FORMATS:
@@ -96,7 +96,7 @@ def first_try(
 def _all(
     source: Path, kind: str, name: str, into: Path, own: list[str], force: tuple[str, ...]
 ) -> int:
-    """The exit status."""
+    """Returns the exit status."""
     recording = source
     if kind:
         step("converting")

@@ -22,7 +22,7 @@ from pelorus.converters import bag, csv, euroc, kitti, ros, streams
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
-from pelorus.converters.ros_motion import Moving, Wheels
+from pelorus.converters.ros_motion import MotionTopics, Wheels
 from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
@@ -31,7 +31,7 @@ from pelorus.rig.lens import LensModel
 
 OWN_DATA = "Your own data"
 RADIUS_MAX_M = 5.0
-# The options of all of them; a command gets what they say as its argument `asked`.
+# The options of all of them; a command gets their values as its argument `asked`.
 SHARED: dict[str, tuple[Any, Any]] = {
     "calibration": (list[Path], own.CALIBRATION),
     "extrinsic": (Path | None, own.EXTRINSIC),
@@ -51,15 +51,15 @@ SHARED: dict[str, tuple[Any, Any]] = {
 }
 
 
-class Stamps(StrEnum):
-    """Of a bag's messages."""
+class StampSource(StrEnum):
+    """Times of a bag's messages: of their headers, or of their arrival."""
 
     HEADER = bag.HEADER
     LOG = bag.LOG
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to `convert`."""
+    """Adds the commands to `convert`."""
     for name, command, example in (
         ("euroc", _euroc, "V1_01_easy V1_01.plr"),
         ("ros", _ros, "drive.mcap drive.plr --calibration camchain.yaml"),
@@ -237,7 +237,9 @@ def _ros(
         "", help="Of what moves the body, for /tf_static; else as its messages say."
     ),
     camera_frame: str = typer.Option("", help="Likewise, of the left camera; z looks forward."),
-    stamps: Stamps = typer.Option(Stamps.HEADER, help="Times of the headers, or of the arrival."),
+    stamps: StampSource = typer.Option(
+        StampSource.HEADER, help="Times of the headers, or of the arrival."
+    ),
     begin: float = typer.Option(
         0.0, "--from", metavar="S", help="Leave out what arrived before, s since the bag began."
     ),
@@ -260,7 +262,7 @@ def _ros(
             right_info_topic,
             camera_frame,
         ),
-        Moving(
+        MotionTopics(
             twist_topic,
             gyro_topic,
             imu_topic,
@@ -278,7 +280,7 @@ def _ros(
 
 
 def _require_imu(wheel_topic: str, twist_topic: str, joint_topic: str) -> None:
-    """PelorusError where another topic than an IMU's would move the body, beside wheels."""
+    """Raises PelorusError where another topic than an IMU's would move the body, beside wheels."""
     if wheel_topic and joint_topic:
         raise PelorusError(
             "--wheel-topic and --joint-topic: both are wheels, one of them is expected"
@@ -308,7 +310,7 @@ def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | No
 
 
 def converted(found: Streams, timing: TwistTiming | None, fix: bool, target: Path) -> None:
-    """Say what was remarked, make the recording, write it."""
-    for remark in found.told:
+    """Prints the remarks, makes the recording, and writes it."""
+    for remark in found.all_remarks:
         out.print(escape(remark))
     write(*streams.converted(found, timing, fix), target)

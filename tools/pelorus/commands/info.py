@@ -17,7 +17,7 @@ from pelorus.frames import Config, Header, Kind, Process
 from pelorus.inertial_survey import ImuSurvey
 from pelorus.settings import IDS, describe
 from pelorus.small_sensors import SMALL_SENSORS
-from pelorus.survey import Survey, Tracks, require_useful, survey
+from pelorus.survey import Survey, TrackSurvey, require_useful, survey
 
 GAPS_SHOWN = 5
 SPELLS_SHOWN = 40
@@ -101,22 +101,22 @@ def _show_config(config: Config, count: int) -> None:
     out.print(table)
 
 
-def _show_calibrated(told: Calibrated, configs: list[Config]) -> None:
-    """What was estimated, and the calibration with it, to be taken over."""
+def _show_calibrated(estimate: Calibrated, configs: list[Config]) -> None:
+    """Prints what was estimated, and the calibration with it, to be copied."""
     table = Table("calibration, estimated", "corrected by", "+-", "", box=None, pad_edge=False)
-    for part, value, sigma in told.parts():
+    for part, value, sigma in estimate.parts():
         table.add_row(part.name, f"{value:+.4f}", f"{sigma:.4f}", part.unit)
     out.print(table)
-    c = told.camera
+    c = estimate.camera
     out.print(
         f"    -> fx {c.fx_px:.3f}, fy {c.fy_px:.3f}, cx {c.cx_px:.3f}, cy {c.cy_px:.3f} px, "
         f"baseline {c.baseline_m:.6f} m"
     )
-    for label, row, t in zip(("T_CB", "", ""), told.R_CB, told.t_CB_m, strict=True):
+    for label, row, t in zip(("T_CB", "", ""), estimate.R_CB, estimate.t_CB_m, strict=True):
         out.print(f"       {label:5}" + "  ".join(f"{x:10.7f}" for x in (*row, t)))
-    if told.offset_s:
+    if estimate.offset_s:
         before = next((m.settings.get(IDS["camera-offset"], 0.0) for m in reversed(configs)), 0.0)
-        out.print(f"       camera-offset = {before + told.offset_s:.5f}")
+        out.print(f"       camera-offset = {before + estimate.offset_s:.5f}")
 
 
 def _show_counts(found: Survey) -> None:
@@ -190,7 +190,7 @@ def _ranges(axes: Sequence[tuple[float, float]]) -> str:
     return ", ".join(f"{least:.3g} to {most:.3g}" for least, most in axes) or "nothing"
 
 
-def _show_tracks(tracks: Tracks) -> None:
+def _show_tracks(tracks: TrackSurvey) -> None:
     least, median, most = tracks.per_frame
     out.print(
         f"{tracks.observations} observations, {least} / {median} / {most} a frame "
@@ -224,9 +224,9 @@ def _show_damage(found: Survey) -> None:
     )
     for fault in counts.faults[:FAULTS_SHOWN]:
         out.print(f"  byte {fault.offset}: {escape(fault.what)}")
-    told = counts.damaged + counts.malformed + counts.unknown + counts.too_long
-    if told > FAULTS_SHOWN:
-        out.print(f"  and {told - FAULTS_SHOWN} more")
+    faults = counts.damaged + counts.malformed + counts.unknown + counts.too_long
+    if faults > FAULTS_SHOWN:
+        out.print(f"  and {faults - FAULTS_SHOWN} more")
 
 
 def _two_columns(title: str) -> Table:

@@ -10,7 +10,7 @@ from pelorus.converters.streams import TwistIn
 
 
 def names(words: str) -> tuple[str, ...]:
-    """Of words that are parted by commas."""
+    """Returns the words between commas."""
     return tuple(word.strip() for word in words.split(",") if word.strip())
 
 

@@ -103,7 +103,7 @@ def report(
 
 
 def _remove_pictures(folder: Path) -> None:
-    """Of an earlier report: not every recording has all of them."""
+    """Removes an earlier report's pictures, for not every recording has all of them."""
     for name in (*DRAWINGS, *OLDER):
         (folder / f"{name}.png").unlink(missing_ok=True)
 
@@ -115,10 +115,10 @@ def _draw(
     source: Path | None,
     calibration: list[Path],
 ) -> tuple[Verdict, list[str]]:
-    """The pictures and the page; the verdict on it, and what is off besides."""
+    """Writes pictures and page; returns the page's verdict, and further remarks."""
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page  # noqa: PLC0415 - as above
-    from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
+    from pelorus.report.beside import NamedLog, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
     from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
@@ -138,7 +138,7 @@ def _draw(
     found = explain(main.messages)
     with waiting("judging"):
         verdict = found.verdict
-    drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
+    drift = drift_table([NamedLog(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
     answer = answers.with_setup(answer, main.messages)
     if source is not None:
@@ -148,7 +148,7 @@ def _draw(
 
 
 def _other(name: str, way: Trajectory, main: Run, truth: Trajectory | None) -> Other:
-    """Brought to the first common pose; PelorusError where there is none."""
+    """Returns another program's path, moved to the first common pose; PelorusError without one."""
     from pelorus.evaluation import assess, beside  # noqa: PLC0415 - scipy loads slowly
     from pelorus.report.curves import Other  # noqa: PLC0415 - as above
 
@@ -159,7 +159,7 @@ def _other(name: str, way: Trajectory, main: Run, truth: Trajectory | None) -> O
 
 
 def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, Path]]:
-    """Title, caption and file of those that stand on the page, which can do without."""
+    """Returns title, caption and file of the page's pictures; the page works without them."""
     if missing := figures_missing():
         err.print(escape(f"the report has no {', '.join(DRAWINGS)}: {missing}"))
         return []
@@ -176,13 +176,13 @@ def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, P
 
 
 def _json(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) -> dict[str, Any]:
-    """The same as `_tell`, and all figures of each run."""
+    """Returns the same as `_tell`, and all figures of each run."""
     return {
         "report": str(page),
         "recording": str(compared.subject.path),
         **verdict.json(),
         "remarks": lines,
-        "health": compared.main.health.told(compared.origin_ns),
+        "health": compared.main.health.lines(compared.origin_ns),
         "runs": {run.name: run.summary for run in compared.runs},
     }
 
@@ -199,7 +199,7 @@ def _tell(compared: Comparison, verdict: Verdict, lines: list[str], page: Path) 
     out.print(table)
     for line in lines:
         out.print(f"[yellow]-[/] {escape(line)}")
-    summary, *spells = compared.main.health.told(compared.origin_ns)
+    summary, *spells = compared.main.health.lines(compared.origin_ns)
     out.print(f"health: {summary}")
     for spell in spells:
         out.print(f"  {escape(spell)}")

@@ -16,7 +16,7 @@ from pelorus.console import err
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
-from pelorus.simulation.imu import Imu, ImuFaults
+from pelorus.simulation.imu import ImuFaults, SimulatedImu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.readings import Sensing, options_without_meaning
 from pelorus.simulation.settings import Numbers, Span, option_name, settings_of
@@ -47,7 +47,7 @@ def run(target: Path, **given: Any) -> None:
         **_values(Options, given),
         mishaps=mishaps,
         readings=readings,
-        imu=Imu(**_values(Imu, given)),
+        imu=SimulatedImu(**_values(SimulatedImu, given)),
         imu_faults=ImuFaults(**_values(ImuFaults, given)),
     )
     recording = simulate(options).recording
@@ -59,7 +59,7 @@ def run(target: Path, **given: Any) -> None:
 
 
 def _parameters(settings: type, panel: str | None) -> Iterator[inspect.Parameter]:
-    """The command's parameters for a dataclass of settings, in their order."""
+    """Yields the command's parameters for a dataclass of settings, in their order."""
     types, defaults = get_type_hints(settings), settings()
     for name, about in settings_of(settings).items():
         default, kind, option = getattr(defaults, name), types[name], option_name(name)
@@ -79,7 +79,7 @@ def _parameters(settings: type, panel: str | None) -> Iterator[inspect.Parameter
 
 
 def _of_sensor(sensor: SmallSensor) -> Iterator[inspect.Parameter]:
-    """The parameters of Sensing, with what this sensor has where they are empty."""
+    """Yields the parameters of Sensing, with this sensor's defaults."""
     units = dict.fromkeys(sensor.unit(letter) for letter in sensor.letters)
     shown = {"sigma": ",".join(units).replace("ps", "/s").upper(), "axes": f"[{sensor.letters}]"}
     usual = {
@@ -105,7 +105,7 @@ def _of_sensor(sensor: SmallSensor) -> Iterator[inspect.Parameter]:
 
 
 def _sensing(sensor: SmallSensor, given: dict[str, Any]) -> dict[str, Any]:
-    """The fields of Sensing. What is as the table has it stays empty."""
+    """Returns the fields of Sensing; those with the table's values stay empty."""
     usual = {p.name: p.default.default for p in _of_sensor(sensor)}
     types = get_type_hints(Sensing)
     found = {}
@@ -120,8 +120,8 @@ def _numbers(name: str, text: str) -> Numbers:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        due = "a number, or several parted by commas,"
-        raise PelorusError(f"{option_name(name)} is {text!r}: {due} is expected") from None
+        expected = "a number, or several parted by commas,"
+        raise PelorusError(f"{option_name(name)} is {text!r}: {expected} is expected") from None
 
 
 def _parameter(
@@ -132,7 +132,7 @@ def _parameter(
 
 
 def _values(settings: type, given: dict[str, Any]) -> dict[str, Any]:
-    """The fields of the dataclass from what was given on the command line."""
+    """Returns the fields of the dataclass from the command line's values."""
     return {name: _value(name, given) for name in settings_of(settings)}
 
 
@@ -153,7 +153,7 @@ def _span(name: str, from_s: float | None, for_s: float) -> Span | None:
 
 
 def _tell_blindness(recording: Recording) -> None:
-    """A recording of nothing is no recording; where a part of it is blind, say so."""
+    """Prints which part of a recording has no observations; refuses one that has none at all."""
     trouble = blindness(recording)
     if trouble and not len(recording.tracks):
         raise PelorusError(trouble)
@@ -167,7 +167,7 @@ run.__dict__["__signature__"] = inspect.Signature(
             "target", inspect.Parameter.KEYWORD_ONLY, default=TARGET, annotation=Path
         ),
         *_parameters(Options, None),
-        *_parameters(Imu, "IMU in place of twists"),
+        *_parameters(SimulatedImu, "IMU in place of twists"),
         *_parameters(Mishaps, "What goes wrong"),
         *_parameters(ImuFaults, "What goes wrong with an IMU"),
         *(p for sensor in SMALL_SENSORS for p in _of_sensor(sensor)),

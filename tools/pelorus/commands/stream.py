@@ -19,12 +19,12 @@ from pelorus.commands.compare import compare_log
 from pelorus.commands.watching import VIEW, watching
 from pelorus.console import err, one_line, out
 from pelorus.errors import PelorusError, writing
-from pelorus.flight.judge import Verdict
+from pelorus.flight.judge import BitsVerdict
 from pelorus.frames import Kind, Message, Pose
 from pelorus.robot.emulator import MACHINES
 from pelorus.robot.state import restored, saved
 from pelorus.robot.status import refusal
-from pelorus.robot.stream import ANSWER_S, Outcome, Streamer
+from pelorus.robot.stream import ANSWER_S, Streamer, StreamResult
 from pelorus.robot.target import BAUD, FORMS, open_target
 from pelorus.wire import header_of, read_file
 
@@ -100,7 +100,7 @@ def stream(
     if record is not None and record.exists() and record.samefile(source):
         raise PelorusError(f"{record}: is the recording to send; --record needs another file")
     streamer: Streamer | None = None
-    verdict = Verdict.SAME
+    verdict = BitsVerdict.SAME
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         log_path = record or (Path(folder) / "flight.plr" if compare else None)
         try:
@@ -126,12 +126,12 @@ def stream(
         raise PelorusError(f"{to}: {outcome.state_trouble}")
     if not outcome.poses:
         raise PelorusError(f"{to}: took {outcome.frames} frames and gave no pose")
-    if verdict is not Verdict.SAME:
+    if verdict is not BitsVerdict.SAME:
         raise typer.Exit(verdict)
 
 
 def _first_frames(messages: list[Message], frames: int | None) -> list[Message]:
-    """The recording up to and with its n-th stereo frame."""
+    """Returns the recording up to and with its n-th stereo frame."""
     stereos = [at for at, message in enumerate(messages) if message.kind == Kind.STEREO]
     if frames is None or frames >= len(stereos):
         return messages
@@ -142,13 +142,13 @@ def _stereos(messages: list[Message]) -> int:
     return sum(message.kind == Kind.STEREO for message in messages)
 
 
-def _how_far(outcome: Outcome, messages: list[Message]) -> str:
+def _how_far(outcome: StreamResult, messages: list[Message]) -> str:
     return f"after {outcome.frames} of {_stereos(messages)} frames"
 
 
 @contextmanager
 def _ended_in_order() -> Iterator[None]:
-    """A request to terminate ends the drive as Ctrl-C does: with it goes the emulator."""
+    """Ends the drive at a request to terminate as at Ctrl-C, which also ends the emulator."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -200,13 +200,13 @@ def _display(messages: list[Message]) -> Iterator[_Display]:
         yield _Display(progress, _stereos(messages))
 
 
-def _tell(outcome: Outcome, record: Path | None) -> None:
-    """A line for each thing, never cut: a board's own words and a path may be long."""
+def _tell(outcome: StreamResult, record: Path | None) -> None:
+    """Prints a line for each thing, never cut: a board's own words and a path may be long."""
     for name, words in _summary(outcome, record):
         out.print(f"{name:<8}  {words}", markup=False)
 
 
-def _summary(outcome: Outcome, record: Path | None) -> Iterator[tuple[str, str]]:
+def _summary(outcome: StreamResult, record: Path | None) -> Iterator[tuple[str, str]]:
     for remark in outcome.texts[:TEXTS_SHOWN]:
         yield "board", one_line(remark.text)
     if len(outcome.texts) > TEXTS_SHOWN:

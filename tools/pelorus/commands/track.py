@@ -99,7 +99,7 @@ def track(
 
 
 def _require_places(target: Path, sheet_file: Path | None) -> None:
-    """Before the work, not after it."""
+    """Refuses bad outputs before the work, not after it."""
     for path in (target, sheet_file):
         if path is not None and not path.parent.is_dir():
             raise PelorusError(f"{path}: cannot be written: there is no folder {path.parent}")
@@ -108,7 +108,7 @@ def _require_places(target: Path, sheet_file: Path | None) -> None:
 
 
 def _read(pairs: list[Pair], bits: int, shown: dict[int, Gray]) -> Iterator[tuple[Gray, Gray]]:
-    """Pair by pair; the left pictures of the sheet stay in `shown`."""
+    """Yields the pairs; the left pictures of the sheet stay in `shown`."""
     wanted = set(sheet.chosen(len(pairs)))
     for k, (left, right) in enumerate(
         images.in_order(progress(pairs, "tracking", len(pairs)), bits)

@@ -27,14 +27,14 @@ def watching(where: str | None) -> Iterator[Callable[[Message], None]]:
     if where is None:
         yield lambda _: None
         return
-    from pelorus.view.drive import Drive  # noqa: PLC0415 - scipy loads slowly
+    from pelorus.view.drive import ShownDrive  # noqa: PLC0415 - scipy loads slowly
     from pelorus.view.in_rerun import InRerun  # noqa: PLC0415
 
     file = Path(where) if where.endswith(".rrd") else None
     if file is not None:
         Existing.keep(file)
     spawn = where == "spawn"
-    drive = Drive([InRerun(file, None if spawn or file else where, spawn)])
+    drive = ShownDrive([InRerun(file, None if spawn or file else where, spawn)])
     try:
         yield drive.take
     finally:

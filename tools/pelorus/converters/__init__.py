@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""One file a source format: read it, check it, hand it back as a Recording."""
+"""Importers, one file a source format: each reads and checks it, and returns a Recording."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A ROS 1 or ROS 2 bag, opened: .bag, a folder with metadata.yaml, .mcap, .db3."""
+"""Opens a ROS 1 or ROS 2 bag: .bag, a folder with metadata.yaml, .mcap, .db3."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 NS = 10**9
-PERIOD_NS = 1000 << 32  # of a counter of 32 bits of us
-ACROSS_NS = NS  # a stream has no longer pause where it wraps
+PERIOD_NS = 1000 << 32  # of a 32-bit counter of microseconds
+ACROSS_NS = NS  # longest pause of a stream across which a wrap is recognised
 HEADER, LOG = "header", "log"
 WHOLE = (0.0, math.inf)
 
@@ -37,14 +37,16 @@ class Stamped(NamedTuple):
 
 
 def require_messages(bag: Bag, topic: str, count: int) -> None:
-    """Refuse a topic of which nothing can be read, whatever the bag's index says."""
+    """Refuses a topic of which nothing can be read, whatever the bag's index says."""
     if not count:
         raise ForeignFileError(bag.path, "no message can be read", at=topic)
 
 
 class Bag(AbstractContextManager["Bag"]):
-    """`stamps`: whether a message's time is that of its header or of its arrival; `part`: which are
-    given, by their arrival, s since the bag's beginning.
+    """An open bag.
+
+    `stamps`: whether a message's time is its header's or its arrival; `part`: which messages are
+    read, by their arrival, s since the bag's beginning.
     """
 
     def __init__(self, path: Path, stamps: str = HEADER, part: tuple[float, float] = WHOLE) -> None:
@@ -55,22 +57,22 @@ class Bag(AbstractContextManager["Bag"]):
             raise ForeignFileError(
                 path,
                 "is a folder without metadata.yaml",
-                due="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap or a "
-                ".db3 is expected (ros2 bag reindex makes a metadata.yaml)",
+                expected="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap "
+                "or a .db3 is expected (ros2 bag reindex makes a metadata.yaml)",
             )
         self._open_files = ExitStack()
         self._reader = self._opened()
         self._seconds = max(self._reader.duration, 1) / NS
         self.begins_ns = int(self._reader.start_time)
         self._part_s = part
-        self.wrapped: dict[str, None] = {}  # topics whose counter started again
+        self.wrapped: dict[str, None] = {}  # topics whose counter wrapped
 
     def _opened(self) -> AnyReader:
         with extra("rosbags"):
             from rosbags.highlevel import AnyReader  # noqa: PLC0415 - an extra
             from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
         try:
-            # bags of before ROS 2 iron hold no definitions
+            # bags from before ROS 2 iron hold no definitions
             store = get_typestore(Stores.ROS2_HUMBLE)
             return self._open_files.enter_context(AnyReader([self.path], default_typestore=store))
         except Exception as error:  # the readers raise a dozen kinds on damaged files
@@ -86,18 +88,18 @@ class Bag(AbstractContextManager["Bag"]):
 
     @property
     def types(self) -> dict[str, str]:
-        """Of the messages, by topic."""
+        """Returns the message types by topic."""
         return {name: info.msgtype or "mixed types" for name, info in self._reader.topics.items()}
 
     def of_type(self, *kinds: str) -> list[str]:
-        """The topics with messages of these types, in ROS 2's way of writing them."""
+        """Returns the topics with messages of these types, which are written as in ROS 2."""
         topics = self._reader.topics
         return [
             name for name, kind in self.types.items() if kind in kinds and topics[name].msgcount
         ]
 
     def require(self, topic: str, *kinds: str) -> str:
-        """The topic, if it is there and holds messages of such a type."""
+        """Returns the topic if it holds messages of such a type; raises PelorusError otherwise."""
         if topic not in self.types:
             raise PelorusError(f"{self.path}: has no topic {topic}; {self.listing()}")
         if self.types[topic] not in kinds or topic not in self.of_type(*kinds):
@@ -108,7 +110,7 @@ class Bag(AbstractContextManager["Bag"]):
         return topic
 
     def listing(self) -> str:
-        """Topics with types and rates."""
+        """Returns the topics with types and rates, in words."""
         lines = [
             f"    {name}  {info.msgtype}  {info.msgcount} messages, "
             f"{max(info.msgcount - 1, 0) / self._seconds:.3g} Hz"
@@ -117,15 +119,15 @@ class Bag(AbstractContextManager["Bag"]):
         return "there are:\n" + ("\n".join(lines) or "    none")
 
     def count(self, topics: Sequence[str]) -> int:
-        """Of their messages."""
+        """Returns the number of messages of these topics."""
         return sum(self._reader.topics[topic].msgcount for topic in topics)
 
     def messages(self, topics: Sequence[str], whole: bool = False) -> Iterator[Stamped]:
-        """In the order of their arrival; `whole`: of all the bag, as for what is said once."""
+        """Yields messages in the order of arrival; `whole`: of all the bag, not of the part."""
         return self._messages(self._reader, topics, whole)
 
     def written(self, topics: Sequence[str]) -> Iterator[Stamped]:
-        """In the order in which they stand in the file, whatever the recorder's clock said."""
+        """Yields messages in the order of the file, whatever the recorder's clock said."""
         return self._messages(self._by_place, topics)
 
     @cached_property
@@ -162,8 +164,9 @@ class Bag(AbstractContextManager["Bag"]):
         return int(stamp.sec) * NS + int(stamp.nanosec)
 
     def _unwrapped(self, topic: str, t_ns: int, latest: dict[str, int]) -> int:
-        """The time of a counter of 32 bits of us that starts again at 0 in mid-drive: a stamp that
-        is within ACROSS_NS of the latest one, but for whole periods.
+        """Returns the time of a 32-bit counter of microseconds that wraps during the drive.
+
+        A stamp within ACROSS_NS of the latest one, up to whole periods, is moved by these.
         """
         before = latest.get(topic, t_ns)
         if t_ns < PERIOD_NS:
@@ -179,7 +182,7 @@ class Bag(AbstractContextManager["Bag"]):
         return ForeignFileError(
             self.path,
             f"cannot be read as a bag: {words}",
-            due="a whole ROS 1 bag, ROS 2 bag or .mcap is expected (rosbag reindex, ros2 bag "
+            expected="a whole ROS 1 bag, ROS 2 bag or .mcap is expected (rosbag reindex, ros2 bag "
             "reindex or "
             "mcap recover mend one that was cut short)",
         )
@@ -189,7 +192,7 @@ class Bag(AbstractContextManager["Bag"]):
 
 
 def _keep_order(reader: Any) -> None:
-    """Have the library give messages as they stand in the file; it sorts them by their arrival."""
+    """Makes the library return messages as they stand in the file; it sorts them by arrival."""
     from rosbags.rosbag1 import Reader as Reader1  # noqa: PLC0415 - an extra
     from rosbags.rosbag2.storage_mcap import McapReader  # noqa: PLC0415
     from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader  # noqa: PLC0415

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""How the columns of a user's CSV are called, and their units: `--columns v=speed_kmh,t=stamp_ms`.
+"""Names and units of the columns of a user's CSV: `--columns v=speed_kmh,t=stamp_ms`.
 
-NAME=COLUMN gives a column of the file the project's name; the unit is what stands behind its last
-underscore, in brackets, or behind a colon: v=speed:km/h. FILE.NAME=COLUMN is for one file alone.
-Without a unit it is asked for, not guessed; but a column that is called plainly vx, wz, ax, px or t
-is taken in SI units, and that is said.
+NAME=COLUMN gives a column of the file the project's name; the unit is what follows its last
+underscore, stands in brackets, or follows a colon: v=speed:km/h. FILE.NAME=COLUMN is for one file
+alone. A column without a unit is refused, not guessed; but one that is plainly called vx, wz, ax,
+px or t is taken in SI units, with a remark.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ RATE = {"radps": 1.0, "rad/s": 1.0, "degps": pi / 180, "dps": pi / 180, "deg/s":
 FORCE = {"mps2": 1.0, "m/s2": 1.0, "m/s^2": 1.0, "g": 9.80665}
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 ANGLE = {"deg": 1.0, "rad": 180 / pi, "e7": 1e-7}  # e7: degrees times 10^7
-NUMBER = {"": 1.0}  # a unit is not needed
+NUMBER = {"": 1.0}  # needs no unit
 
-# What --columns may name, the column that the converters ask for, and units with their factors.
+# By name in --columns: the column that the converters read, and units with their factors.
 NAMES: dict[str, tuple[str, Mapping[str, float]]] = {
     "t": ("t", TIME_UNITS),
     **{f"v{a}": (f"v{a}_mps", VELOCITY) for a in "xyz"},
@@ -43,7 +43,7 @@ NAMES: dict[str, tuple[str, Mapping[str, float]]] = {
     **{f"{axis}{side}": (f"{axis}{side}_px", NUMBER) for side in "LR" for axis in "uv"},
 }
 
-# Columns whose names say their units in brackets, as EuRoC's and others' do.
+# Columns with units in brackets, as EuRoC has them.
 BRACKETED = re.compile(r"(?P<base>[^\[]*?)\s*\[.+\]")
 BASES = {
     "t": re.compile(r"t|time|timestamp|stamp"),
@@ -56,7 +56,7 @@ BASES = {
 MOTION = ("twists", "imu", "gyro")  # files that may hold several sensors
 PLACES = ("position", "truth")  # files whose places may be on the earth
 
-# A column with the plain name, vx, is taken in the first unit, and that is said.
+# Columns that have the plain name, vx, and are taken in the first unit, with a remark.
 PLAIN = {
     target: (short, "" if units is NUMBER else next(iter(units)))
     for short, (target, units) in NAMES.items()
@@ -78,24 +78,24 @@ class Column:
 
 @dataclass(frozen=True)
 class Columns:
-    """All of them; `read` is how the converters read a CSV file."""
+    """All column names of --columns; `read` is how the converters read a CSV file."""
 
     given: list[Column] = field(default_factory=list)
     seen: dict[Path, list[str]] = field(default_factory=dict)
-    remarks: list[str] = field(default_factory=list)  # of the files that were read
+    remarks: list[str] = field(default_factory=list)  # on the files that were read
     ground: Ground = field(default_factory=Ground)
-    rows: list[instances.Asked] = field(default_factory=list)
+    rows: list[instances.AskedRows] = field(default_factory=list)
 
     @classmethod
     def of(cls, words: list[str], crs: str = "", rows: Sequence[str] = ()) -> Columns:
-        """Of the words of --columns, of --crs and of --rows."""
+        """Parses the words of --columns, of --crs and of --rows."""
         parts = [part.strip() for word in words for part in word.split(",") if part.strip()]
         given = [_column(part) for part in parts if not _says_nothing(part)]
-        asked = [instances.Asked.of(words) for words in rows]
+        asked = [instances.AskedRows.of(words) for words in rows]
         return cls(given, ground=Ground(crs), rows=asked)
 
     def read(self, path: Path, file: str) -> Table:
-        """The file's columns under the project's names; `file` is its option's name."""
+        """Returns the file's columns under the project's names; `file` is its option's name."""
         table = ulog.table(path, file) if ulog.is_one(path) else Table.read(path)
         self.remarks.extend(table.remarks)
         table.hint_of, table.plain, table.remarks = _hint, PLAIN, self.remarks
@@ -117,7 +117,7 @@ class Columns:
         return table
 
     def require_used(self) -> None:
-        """Refuse a name of which no file has the column: it is a typing error."""
+        """Refuses a name whose column no file has: it is a typing error."""
         for one in self.given:
             if not one.used:
                 there = "; ".join(f"{p}: {', '.join(names)}" for p, names in self.seen.items())
@@ -132,8 +132,9 @@ class Columns:
 
 
 def _name_bracketed(table: Table) -> None:
-    """Give the project's names to columns of other programs that tell their units: a time, rates
-    of turn, specific forces.
+    """Gives the project's names to other programs' columns that have units.
+
+    These are a time, rates of turn and specific forces.
     """
     for column in table.names:
         bracketed = BRACKETED.fullmatch(column)
@@ -149,19 +150,19 @@ def _name_bracketed(table: Table) -> None:
 
 
 def _says_nothing(words: str) -> bool:
-    """vx=vx: a column that has the plain name already."""
+    """Returns whether a word like vx=vx renames nothing."""
     name, _, column = words.partition("=")
     return name == column and name in NAMES
 
 
 def _hint(lacking: str, there: Sequence[str]) -> str:
-    """What to do where a column is there under another name."""
+    """Returns what to write where a column exists under another name."""
     short = _short_of(lacking)
     return f". If it is called otherwise: --columns {example(lacking, there)}" if short else ""
 
 
 def example(lacking: str, there: Sequence[str]) -> str:
-    """What to write for it: wx=COLUMN:radps, or the column itself if only its unit is another."""
+    """Returns an example of the option: wx=COLUMN:radps, or with the plain column's name."""
     short = _short_of(lacking)
     units = NAMES[short][1]
     for column in there:
@@ -178,7 +179,7 @@ def _short_of(target: str) -> str:
 
 
 def _short(name: str) -> tuple[str, str]:
-    """vx_mps, the project's own name for the column, is vx, and tells the unit."""
+    """Returns the short name, which has no unit: vx for the project's vx_mps."""
     short, _, unit = name.partition("_")
     if name in NAMES or short not in NAMES:
         return name, ""
@@ -214,7 +215,7 @@ def _column(words: str) -> Column:
 
 
 def _unit_in(column: str) -> str:
-    """Of speed_mps, or of w_RS_S_x [rad s^-1], as EuRoC has it."""
+    """Returns the unit in speed_mps, or in w_RS_S_x [rad s^-1], as EuRoC writes it."""
     bracket = re.search(r"\[(.*)\]$", column)
     if bracket is None:
         return column.rpartition("_")[2]

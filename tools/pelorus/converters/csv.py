@@ -6,7 +6,7 @@ imu      t_s, ax_mps2, ay_mps2, az_mps2, wx_radps, wy_radps, wz_radps, in place 
 stereo   t_s, id, uL_px, vL_px, uR_px, vR_px; the rows of one time are one frame
 truth    t_s, px_m, py_m, pz_m, qx, qy, qz, qw: body to world (optional); or a TUM or EuRoC file
 
-And those of small sensors: readings_csv. Columns with other names: columns.
+Small sensors have files of their own (readings_csv), and columns may have other names (columns).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from pelorus import foreign, trajectory
 from pelorus.converters import readings_csv, streams, twist_axes, wheels
 from pelorus.converters.columns import Columns, example
-from pelorus.converters.streams import Readings, Seen, Streams, TwistIn, Twists
+from pelorus.converters.streams import RawTracks, Readings, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
 from pelorus.foreign import ForeignFileError
@@ -48,12 +48,13 @@ RATES = {short: name for short, name in VELOCITIES.items() if short[0] == "w"}
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 PIXELS = ("uL_px", "vL_px", "uR_px", "vR_px")
 POSITION, QUATERNION = ("px_m", "py_m", "pz_m"), ("qx", "qy", "qz", "qw")
-NAMES_ITS_COLUMNS = 0.5  # of the first row's cells: letters, where others have numbers
+NAMES_ITS_COLUMNS = 0.5  # share of the first row's cells with letters, where others have numbers
 
 
 @dataclass(frozen=True)
 class MotionFiles:
-    """Twists or an IMU, with a gyro's file beside them or without: one of them is expected.
+    """The files of twists or of an IMU, one of which is expected; a gyro may have a file of its
+    own.
 
     `measured` are the velocities that the twists' file has, `axes` are theirs.
     """
@@ -67,7 +68,7 @@ class MotionFiles:
 
 @dataclass(frozen=True)
 class Sources:
-    """The files of one recording; those of its calibration, and choices, as rig.read has them."""
+    """The files of one recording; its calibration and choices are as rig.read has them."""
 
     motion: MotionFiles
     stereo: Path | None
@@ -85,9 +86,9 @@ def convert(
     twist_timing: TwistTiming | None = None,
     readings: Mapping[str, list[Path]] | None = None,
 ) -> tuple[Recording, list[Finding]]:
-    """Read; mend and measure the noise if asked. `twist_timing` overrides the calibration's.
+    """Reads the files; with `fix` also mends the recording and measures its noise.
 
-    `readings` are the files of small sensors, by name.
+    `twist_timing` overrides the calibration's. `readings` are the files of small sensors, by name.
     """
     return streams.converted(read(sources, readings or {}, twist_timing), twist_timing, fix)
 
@@ -97,7 +98,7 @@ def read(
     readings: Mapping[str, list[Path]],
     twist_timing: TwistTiming | None = None,
 ) -> Streams:
-    """The files as they are."""
+    """Reads the files as they are."""
     columns = sources.columns
     calibrated = _calibrated(sources)
     timing = calibrated.header.twist_timing if twist_timing is None else twist_timing
@@ -109,7 +110,7 @@ def read(
     if sources.stereo is None:
         frames = _blind(motion, small, columns.remarks)
     else:
-        frames = Seen(sources.stereo, *_stereo(columns.read(sources.stereo, "stereo")))
+        frames = RawTracks(sources.stereo, *_stereo(columns.read(sources.stereo, "stereo")))
     columns.require_used()
     on_earth = columns.ground.origin_m is not None
     return Streams(calibrated, frames, motion, truth, small, columns.remarks, on_earth)
@@ -126,9 +127,10 @@ def _calibrated(sources: Sources) -> Calibrated:
     )
 
 
-def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) -> Seen:
-    """Frames without a point at the times of the small sensors' readings: there the filter tells
-    its pose, and there it is compared with a truth.
+def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) -> RawTracks:
+    """Returns frames without points at the times of the small sensors' readings.
+
+    There the filter reports its pose, which is compared with a truth.
     """
     if not small:
         raise PelorusError(
@@ -142,14 +144,14 @@ def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) 
     )
     nothing = np.empty(0, np.int64)
     tracks = Tracks(len(t_ns), nothing.astype(np.intp), nothing, np.empty((0, 4)))
-    return Seen(motion.where, t_ns, tracks)
+    return RawTracks(motion.where, t_ns, tracks)
 
 
 # --- motion ---------------------------------------------------------------------------------------
 
 
 def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twists | Readings:
-    """Of the files that there are."""
+    """Reads twists or an IMU from the files that are given."""
     twists, imu = files.twists, files.imu
     if twists is not None and imu is None:
         if files.gyro is None:
@@ -168,7 +170,7 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
             raise ForeignFileError(
                 imu,
                 "has no rates of turn",
-                due=f"{', '.join(RATES.values())} are expected, or --gyro FILE with them; "
+                expected=f"{', '.join(RATES.values())} are expected, or --gyro FILE with them; "
                 "there are: "
                 f"{', '.join(table.names)}",
             )
@@ -189,7 +191,7 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
 
 
 def measured_of(words: str) -> frozenset[str]:
-    """vx,wz and such, as --measured has them."""
+    """Parses --measured (vx,wz and such)."""
     found = [word.strip() for word in words.split(",")]
     if not set(found) <= set(VELOCITIES) or not found:
         raise PelorusError(
@@ -209,7 +211,7 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
         raise ForeignFileError(
             path,
             f"lacks the column {', '.join(lacking)}",
-            due=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
+            expected=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
             f"{','.join(there)}. If they are called otherwise: --columns {otherwise}",
         )
     table.require(*lacking)
@@ -223,7 +225,9 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
 
 
 def _poses_beside(table: Table) -> Poses | None:
-    """Of the twists' own file, if it tells how the body stood; NaN where it does not say where."""
+    """Returns the poses in the twists' file, with NaN positions if unknown; None without
+    attitude.
+    """
     if not all(map(table.has, QUATERNION)):
         return None
     p = np.full((table.count, 3), np.nan)
@@ -243,7 +247,7 @@ def _poses_beside(table: Table) -> Poses | None:
 def _readings(
     paths: Mapping[str, list[Path]], motion: Twists | Readings, columns: Columns
 ) -> list[Reading]:
-    """Of all small sensors."""
+    """Reads all small sensors."""
     found: list[Reading] = []
     t_ns = motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
     files = [(sensor, path) for sensor in SMALL_SENSORS for path in paths.get(sensor.name, [])]
@@ -286,7 +290,7 @@ def _stereo(table: Table) -> tuple[Times, Tracks]:
 
 
 def truth_of(path: Path, columns: Columns) -> Trajectory:
-    """A CSV with named columns, else a TUM file or EuRoC's."""
+    """Reads a truth: a CSV with named columns, a TUM file or EuRoC's."""
     lines = (line.lstrip() for line in foreign.text(path).splitlines())
     first = next((line for line in lines if line and not line.startswith("#")), "")
     if not _names_columns(first.split(",")):
@@ -304,6 +308,6 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
 
 
 def _names_columns(cells: Sequence[str]) -> bool:
-    """Whether the first row behind comments holds names; in EuRoC's and TUM's files it does not."""
+    """Returns whether the first row after comments has column names; EuRoC's and TUM's has none."""
     words = [cell for cell in cells if cell.strip()[:1].isalpha()]
     return len(words) > NAMES_ITS_COLUMNS * len(cells)

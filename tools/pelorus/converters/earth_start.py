@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where a robot stood and how it was turned as its drive began, by positions in axes of the earth.
+"""Finds a robot's pose at the start of its drive from positions in axes of the earth.
 
-A filter's world begins with the robot; positions east and north say nothing to it until the heading
-is known. The way that the twists alone give, on level ground, is turned and moved until it fits the
-positions: a way long enough for the turn to be known, and short enough for the drift to be small.
+A filter's world begins with the robot; positions east and north are of no use to it until the
+heading is known. The path by the twists alone, on level ground, is turned and moved until it fits
+the positions. The path must be long enough for the heading, and short enough for small drift.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ LEVEL = {
     BodyAxes.FORWARD_LEFT_UP: np.eye(3),
     BodyAxes.FORWARD_RIGHT_DOWN: np.diag([1.0, -1.0, -1.0]),
 }
-TILT_SIGMA_RAD = 0.1  # of ground on which a robot stands
-YAW_KNOWN_RAD = 0.02  # so well the turn need be known: then the way is long enough
-YAW_MOST_RAD = 0.3  # worse, it is not told
+TILT_SIGMA_RAD = 0.1  # of the ground on which a robot stands
+YAW_KNOWN_RAD = 0.02  # sufficient sigma of the heading: the path is long enough
+YAW_MOST_RAD = 0.3  # with a larger sigma there is no START
 SUBJECT = "heading at the start"
 
 
 def started(recording: Recording) -> tuple[Recording, Finding]:
-    """The recording with a START in the axes of its positions, if its twists tell one."""
+    """Returns the recording with a START in its positions' axes, if its twists determine one."""
     readings = [m for m in recording.readings if m.sensor == POSITION.number and m.axes & 3 == 3]
     level = LEVEL.get(recording.header.body_axes)
     if not len(recording.twist_t_ns):
@@ -76,8 +76,10 @@ def started(recording: Recording) -> tuple[Recording, Finding]:
 def _ways(
     recording: Recording, readings: list[Reading], level: Floats
 ) -> tuple[Floats, Floats, float]:
-    """(n, 3) places of the sensor by the twists, in level axes of the first body; as it read them,
-    up to the arm's turn; and the readings' sigma.
+    """Returns two paths (n, 3) of the sensor, and the readings' sigma.
+
+    The first is by the twists, in level axes of the first body; the second is as the sensor read
+    it, up to the arm's turn.
     """
     t_ns = np.array([m.t_ns for m in readings], np.int64)
     body: Poses = motion.path_at(
@@ -106,5 +108,5 @@ def _untold(why: str) -> Finding:
         why,
         "positions are used only if the start's place and heading are given in their axes: by a "
         "truth (--truth), or by START",
-        told=False,
+        is_conclusive=False,
     )

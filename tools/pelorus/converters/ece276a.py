@@ -3,8 +3,8 @@
 
 `time_stamps` (1, T) s; `features` (4, M, T) px in the order uL vL uR vR, all four -1 where absent;
 `linear_velocity` (3, T) m/s; `angular_velocity` or `rotational_velocity` (3, T) rad/s; `K` (3, 3);
-`b` baseline, m; `imu_T_cam` or `cam_T_imu` (4, 4). They say nothing of their noise; what can be
-measured of it goes into the HEADER (twist_noise.py).
+`b` baseline, m; `imu_T_cam` or `cam_T_imu` (4, 4). They have no noise sigmas; what can be measured
+of the noise goes into the HEADER (twist_noise.py).
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def convert(
     twist_timing: TwistTiming | None = None,
     keep_ids: bool = False,
 ) -> tuple[Recording, list[Finding]]:
-    """Read; if asked, mend and measure the twists' noise; add the truth.
+    """Reads a file; with `fix` mends it and measures the twists' noise; adds the truth.
 
-    `twist_timing` None: let the data decide. `keep_ids`: what else is mended, stale tracks are not.
+    `twist_timing` None: the data decide. With `keep_ids` stale tracks are not mended.
     """
     given = recording = read(source)
     tracks = recording.tracks
@@ -65,7 +65,7 @@ def _left_alone(finding: Finding) -> Finding:
 
 
 def read(source: Path) -> Recording:
-    """The file as it is."""
+    """Reads the file as it is."""
     file = arrays.read_npz(source)
     t_ns = arrays.nanoseconds(source, "time_stamps", file.get("time_stamps").ravel())
     count = len(t_ns)
@@ -81,24 +81,26 @@ def read(source: Path) -> Recording:
 
 
 def _extrinsic(file: Arrays) -> Poses:
-    """T_CB: `cam_T_imu` brings the body to the camera, `imu_T_cam` is its inverse."""
+    """Returns T_CB: `cam_T_imu` maps body to camera, `imu_T_cam` is its inverse."""
     key = file.one_of("cam_T_imu", "imu_T_cam")
     matrix = file.get(key, shape=(4, 4))
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise ForeignFileError(
-            file.path, f"the last row of {key} is {matrix[3]}", due="0 0 0 1 is expected"
+            file.path, f"the last row of {key} is {matrix[3]}", expected="0 0 0 1 is expected"
         )
     T = Poses(arrays.rotation(file.path, key, matrix[:3, :3]), matrix[:3, 3])
     return T if key == "cam_T_imu" else se3.inverse(T)
 
 
 def with_truth(recording: Recording, path: Path) -> Recording:
-    """KITTI poses of the left camera; row k belongs to frame k. Fewer rows than frames are fine."""
+    """Adds KITTI poses of the left camera; row k belongs to frame k, rows may be fewer."""
     poses = trajectory.read_kitti(path)
     frames = len(recording.frame_t_ns)
     if len(poses.p) > frames:
         raise ForeignFileError(
-            path, f"{len(poses.p)} poses for {frames} frames", due="at most one each is expected"
+            path,
+            f"{len(poses.p)} poses for {frames} frames",
+            expected="at most one each is expected",
         )
     body = trajectory.body_poses(poses, recording.T_CB)
     return recording.with_truth(recording.frame_t_ns[: len(poses.p)], body)

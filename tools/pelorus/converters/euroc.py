@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Folders of the EuRoC MAV data set (ASL format), and those that are laid out like them.
+"""Folders of the EuRoC MAV data set (ASL format), and others of the same layout.
 
 mav0/cam0, cam1    data.csv (time in ns, file), data/ with the pictures, sensor.yaml
 mav0/imu0          data.csv (ns, gyro rad/s, specific force m/s^2), sensor.yaml
 mav0/state_groundtruth_estimate0, mocap0, gt0 or vicon0    data.csv (ns, position, quaternion
                    w x y z), sensor.yaml; the first that is there
 
-Public copies lack some of the pictures that data.csv lists. What is lost is left out, counted and
-told; where it is much, the folder is refused.
+Public copies lack some of the pictures that data.csv lists. These are left out, with a count; where
+they are many, the folder is refused.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from pelorus.trajectory import Trajectory
 CAMERAS = ("cam0", "cam1")
 IMU = "imu0"
 TRUTHS = ("state_groundtruth_estimate0", "mocap0", "gt0", "vicon0")
-TUM_VI = "dso"  # beside mav0, with Kalibr's files, where the cameras have no sensor.yaml
+TUM_VI = "dso"  # Kalibr's files beside mav0, where the cameras have no sensor.yaml
 TUM_VI_FILES = ("camchain.yaml", "imu_config.yaml")
 POSITIONS = "leica0"  # of a prism, without attitude
 IMU_COLUMNS = 7
@@ -45,11 +45,11 @@ NS_MAX = 2**63
 
 
 def read(folder: Path, asked: Asked) -> Streams:
-    """What the folder holds."""
+    """Reads a folder."""
     top = _top(folder)
     body = _of_body(top / IMU)
     given, name = asked.calibration, resolved(folder).name
-    of_imu = rig_files.are_of_imu(given)  # beside the folder's own cameras
+    of_imu = rig_files.are_of_imu(given)  # in addition to the folder's own cameras
     paths = given if given and not of_imu else _calibrations(top, given)
     calibrated = rig_files.read(paths, name, asked.extrinsic, asked.lens, asked.cameras)
     if (not given or of_imu) and asked.extrinsic is None and body is not None:
@@ -81,7 +81,7 @@ def _top(folder: Path) -> Path:
 
 
 def _calibrations(top: Path, of_imu: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Of the folder; the files of an IMU that the user gives take the place of its own."""
+    """Returns the folder's calibration files; the user's files of an IMU replace its own."""
     beside = top.parent / TUM_VI
     if not (top / CAMERAS[0] / "sensor.yaml").is_file() and (beside / "camchain.yaml").is_file():
         camchain, imu = map(beside.joinpath, TUM_VI_FILES)
@@ -98,7 +98,7 @@ def _calibrations(top: Path, of_imu: tuple[Path, ...]) -> tuple[Path, ...]:
 
 
 def _of_body(folder: Path) -> Poses | None:
-    """T_BS of a sensor.yaml: the sensor's points in the folder's body; None where none is told."""
+    """Returns T_BS of a sensor.yaml, sensor to the folder's body; None where there is none."""
     path = folder / "sensor.yaml"
     if not path.is_file():
         return None
@@ -109,7 +109,7 @@ def _of_body(folder: Path) -> Poses | None:
 
 
 def _on_imu(calibrated: Calibrated, body_of_imu: Poses) -> Calibrated:
-    """The recording's body is the IMU, which need not be the folder's body."""
+    """Moves the recording's body to the IMU, which need not be the folder's body."""
     T_CB = Poses(calibrated.header.R_CB, calibrated.header.t_CB_m)
     T = se3.compose(T_CB, body_of_imu)
     rig = calibrated.rig
@@ -122,7 +122,7 @@ def _on_imu(calibrated: Calibrated, body_of_imu: Poses) -> Calibrated:
 
 
 def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures:
-    """Pairs that were taken together."""
+    """Returns the pairs of pictures that were taken together."""
     where = top / ordered[0], top / ordered[1]
     (left, lost_left), (right, lost_right) = (_listed(camera, remarks) for camera in where)
     of_left, of_right = _times(left, remarks), _times(right, remarks)
@@ -134,7 +134,11 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
             f"{where[0]} and {where[1]}: {len(both)} pairs, taken within "
             f"{images.APART_NS * 1e-6:g} ms; {alone} pictures have no partner"
             + (f", {len(lost)} are not there or cut off, {lost[0]} first" if lost else "")
-            + (_apart(of_left, of_right) if len(of_left) and len(of_right) and not lost else "")
+            + (
+                _apart_words(of_left, of_right)
+                if len(of_left) and len(of_right) and not lost
+                else ""
+            )
         )
     if len(both) < images.PAIRS_MIN:
         raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are expected")
@@ -152,7 +156,7 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
 
 
 def _times(listed: dict[int, Path], remarks: list[str]) -> Times:
-    """In order, without one that was never set."""
+    """Returns the times in order, without one that was never set."""
     t_ns = np.array(sorted(listed), np.int64)
     unset = arrays.never_set(t_ns)
     if unset.any():
@@ -160,8 +164,8 @@ def _times(listed: dict[int, Path], remarks: list[str]) -> Times:
     return t_ns[~unset]
 
 
-def _apart(left_ns: Times, right_ns: Times) -> str:
-    """Of cameras that were not triggered together."""
+def _apart_words(left_ns: Times, right_ns: Times) -> str:
+    """Returns in words how far apart the times of cameras without a common trigger are."""
     apart_ns = np.abs(right_ns[motion.nearest(right_ns, left_ns)] - left_ns)
     return (
         f"; the nearest times are {np.median(apart_ns) * 1e-6:.3g} ms apart in the median, "
@@ -170,8 +174,9 @@ def _apart(left_ns: Times, right_ns: Times) -> str:
 
 
 def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Path]]:
-    """By time the pictures that are there, of data.csv where there is one, else the names in data/;
-    and those that are not there.
+    """Returns the existing pictures by time, and the missing ones.
+
+    They are those of data.csv, else the names in data/.
     """
     listing, data = camera / "data.csv", camera / "data"
     there = images.pictures(data)
@@ -190,10 +195,10 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
                 listing,
                 f"holds {' '.join(cells)[:60]!r}",
                 at=f"line {line}",
-                due="a time in ns, a file are expected",
+                expected="a time in ns, a file are expected",
             )
         path = data / cells[1]
-        found = there.pop(path.stem, None)  # another kind of file is the same picture
+        found = there.pop(path.stem, None)  # a picture may be another kind of file
         if found is not None and images.is_whole(found):
             named_there[int(cells[0])] = found
         elif int(cells[0]) not in named_there:  # a line may stand twice
@@ -224,7 +229,7 @@ def _imu(path: Path, remarks: list[str]) -> Inertial:
 
 
 def _truth(top: Path, body_of_imu: Poses | None, remarks: list[str]) -> Trajectory | None:
-    """The IMU's poses: those of the sensor, times where the IMU sits in it."""
+    """Returns the IMU's poses: those of the sensor, composed with the IMU's place in it."""
     folder = next((top / name for name in TRUTHS if (top / name / "data.csv").is_file()), None)
     if folder is None:
         if (top / POSITIONS / "data.csv").is_file():

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Does an IMU reach the end of its range? A reading there says "at least so much".
+"""Detects an IMU that reaches the end of its range, where a reading is only a lower bound.
 
-Where it clips, the largest number stands many times, more often than numbers a little smaller; a
-motion that merely turns round there leaves more of these. Parts have ranges of round numbers: near
-one of them fewer readings tell.
+Where it clips, the largest number occurs many times, more often than slightly smaller ones; a
+motion that merely reverses there leaves more of these. Parts have ranges of round numbers: near one
+of them fewer readings suffice.
 """
 
 from __future__ import annotations
@@ -17,20 +17,21 @@ from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
-SAME = 1e-5  # of the largest number: files round
-BELOW = 0.95  # from this part of it on, numbers are a little smaller
+SAME = 1e-5  # of the largest number, for rounding
+BELOW = 0.95  # share of it from which numbers count as slightly smaller
 NAMED_LEAST, OTHERS_LEAST = 5, 20  # readings at the end of a range that parts have, or of another
 NAMED_NEAR = 0.015
-STEPS_LEAST = 100  # of the number's last digit: at rest a coarse one stands often, too
+STEPS_LEAST = 100  # in last digits: at rest a coarse number occurs often, too
 DEG, G = np.pi / 180, 9.80665
 GYRO_RANGES = DEG * np.array([125, 245, 250, 300, 400, 450, 500, 1000, 2000, 4000])
 ACCEL_RANGES = G * np.array([2, 3, 4, 6, 8, 12, 16, 24, 30, 32, 40, 64])
-INSIDE = 0.999  # of the range, that the setting names
+INSIDE = 0.999  # factor of the range in the setting
 
 
 def with_ranges(recording: Recording, raw: Inertial) -> tuple[Recording, list[Finding]]:
-    """The recording with gyro-range and accel-range set where `raw`, the readings before they were
-    corrected, clip.
+    """Returns the recording with gyro-range and accel-range set where the sensor clips.
+
+    `raw` are the readings before they were corrected.
     """
     settings, findings = dict(recording.settings), []
     parts = (
@@ -51,7 +52,7 @@ def with_ranges(recording: Recording, raw: Inertial) -> tuple[Recording, list[Fi
 
 
 def clips(x: Floats, ranges: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """(n, 3) which numbers stand at the end of the range."""
+    """Returns (n, 3) which numbers are at the end of the range."""
     size = np.abs(x)
     end = float(size.max(initial=0.0))
     at_end = size >= end * (1 - SAME)
@@ -64,6 +65,6 @@ def clips(x: Floats, ranges: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.
 
 
 def _step(size: Floats) -> float:
-    """Between neighbouring numbers, the usual one of a part that counts."""
+    """Returns the resolution: the usual step between neighbouring numbers."""
     steps = np.diff(np.unique(size))
     return float(np.median(steps)) if len(steps) else np.inf

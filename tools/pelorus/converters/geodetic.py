@@ -32,13 +32,15 @@ LOCAL_MAX_M = 1e5  # farther off, east and north are no plane's
 
 @dataclass
 class Ground:
-    """`crs` is what the user named; all files share the origin, the first place that was read."""
+    """The ground of all files: `crs` is the user's, the origin is the first place read."""
 
     crs: str = ""
     origin_m: Floats | None = None  # geocentric
 
     def local(self, path: Path, places: Floats, remarks: list[str]) -> Floats:
-        """(n, 3) longitude, latitude, height, or easting, northing, height -> m, east north up."""
+        """Returns (n, 3) m east, north, up of (longitude, latitude or easting, northing;
+        height).
+        """
         crs = self.system()
         from pyproj import Transformer  # noqa: PLC0415 - an extra
 
@@ -56,7 +58,7 @@ class Ground:
             raise ForeignFileError(
                 path,
                 f"a place lies {np.abs(found).max() * 1e-3:.4g} km from the first one",
-                due=f"at most {LOCAL_MAX_M * 1e-3:g} km are expected: is there a row without "
+                expected=f"at most {LOCAL_MAX_M * 1e-3:g} km are expected: is there a row without "
                 "a fix?",
             )
         remarks.append(
@@ -66,7 +68,7 @@ class Ground:
         return found
 
     def system(self) -> CRS:
-        """What the numbers are of."""
+        """Returns the coordinate system of the numbers."""
         with extra("pyproj"):
             from pyproj import CRS  # noqa: PLC0415 - an extra
             from pyproj.exceptions import CRSError, ProjError  # noqa: PLC0415
@@ -81,7 +83,7 @@ class Ground:
 
 
 def localise(table: Table, ground: Ground) -> None:
-    """Give a file with places on the earth the columns of local metres."""
+    """Gives a table with places on the earth the columns of local metres."""
     if any(map(table.has, LOCAL)):
         return
     by_degrees = all(map(table.has, DEGREES))
@@ -92,7 +94,7 @@ def localise(table: Table, ground: Ground) -> None:
         raise ForeignFileError(
             table.path,
             f"{' and '.join(GRID)}: in which grid?",
-            due="--crs EPSG:326NN is expected for zone NN north of UTM on WGS 84, EPSG:327NN "
+            expected="--crs EPSG:326NN is expected for zone NN north of UTM on WGS 84, EPSG:327NN "
             "for south",
         )
     if by_degrees != (ground.system().is_geographic if ground.crs else True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How well an IMU's readings fit the true motion: from each true pose to the next one."""
+"""Measures how well an IMU's readings fit the true motion, from each true pose to the next one."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from pelorus import inertial
 from pelorus.faults.finding import Finding
-from pelorus.inertial import Inertial, Moving
+from pelorus.inertial import Inertial, MotionState
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
 
 MAD_TO_SIGMA = 1.4826  # of a normal distribution
-FAITHFUL = 1.5  # times the noise that is told: what is above it is found
+FAITHFUL = 1.5  # ratio to the given noise, above which the readings do not fit
 
 
 class TrueMotion(NamedTuple):
@@ -35,14 +35,14 @@ class TrueMotion(NamedTuple):
 
 
 def compare(recording: Recording, truth: TrueMotion) -> Finding:
-    """White noise of the density told would leave a velocity's change off by density sqrt(tau)."""
+    """Compares the readings with the truth: white noise changes a velocity by density sqrt(tau)."""
     readings, noise = recording.inertial, recording.header.noise
     first, last = np.searchsorted(truth.t_ns, (readings.t_ns[0], readings.t_ns[-1] + 1))
     truth = truth.at(slice(int(first), int(last)))
     before, after = truth.at(slice(None, -1)), truth.at(slice(1, None))
     if not len(after.t_ns):
-        return Finding("noise of the readings", False, "no two true poses", "", told=False)
-    start = Moving(before.R, before.p, before.v_B)
+        return Finding("noise of the readings", False, "no two true poses", "", is_conclusive=False)
+    start = MotionState(before.R, before.p, before.v_B)
     ends = inertial.coasted(
         _without_bias(readings, truth), before.t_ns, after.t_ns, start, noise.gravity
     )
@@ -66,7 +66,7 @@ def _without_bias(readings: Inertial, truth: TrueMotion) -> Inertial:
 
 
 def _sigma(differences: Floats) -> float:
-    """Of an axis, the middle taken as it is: a bias that is a little wrong does not count."""
+    """Returns the sigma of an axis about its median, so that a small bias does not count."""
     middle = np.median(differences, axis=0)
     return float(
         np.sqrt(np.mean((MAD_TO_SIGMA * np.median(abs(differences - middle), axis=0)) ** 2))

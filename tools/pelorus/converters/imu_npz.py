@@ -45,15 +45,15 @@ from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 
 QUATERNION_NORM_TOLERANCE = 1e-3
-ALIGNED_M = 1e-4  # the right camera's place in the left one: (baseline, 0, 0)
+ALIGNED_M = 1e-4  # tolerance of the right camera's place in the left one: (baseline, 0, 0)
 GRAVITY_TILT = 1e-6
-SAME_TIME_NS = 1000  # a start is at the reading that is so near
+SAME_TIME_NS = 1000  # largest distance of a start from its reading
 
 
 class StartSigmas(NamedTuple):
-    """How well the state of `init` is known: a simulator's is exact, and written to many digits.
+    """The sigmas of the state of `init`, which a simulator writes exactly, to many digits.
 
-    The biases walk: a prior narrower than they stray in a minute would soon be told to be wrong.
+    The biases walk: a prior narrower than their walk of a minute would soon be reported as wrong.
     """
 
     position_m: float = 1e-4
@@ -67,20 +67,20 @@ START_SIGMAS = StartSigmas()
 
 
 def start_sigmas(words: str) -> StartSigmas:
-    """From what the option has."""
+    """Parses the option's sigmas."""
     try:
         numbers = [float(word) for word in words.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) != len(StartSigmas._fields) or not all(0 < x < np.inf for x in numbers):
-        due = f"{len(StartSigmas._fields)} positive numbers parted by commas are expected"
-        raise PelorusError(f"--start-sigmas is {words!r}: {due}")
+        expected = f"{len(StartSigmas._fields)} positive numbers parted by commas are expected"
+        raise PelorusError(f"--start-sigmas is {words!r}: {expected}")
     return StartSigmas(*numbers)
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What may be asked of the conversion."""
+    """The options of the conversion."""
 
     keep_ids: bool = False
     seed: int | None = None
@@ -89,7 +89,7 @@ class Choices:
 
 
 def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
-    """The recording, how its readings fit its truth, and what is wrong with it by name."""
+    """Returns the recording, how its readings fit its truth, and its named faults."""
     recording, truth = read(source, choices.start)
     findings = [imu_noise.compare(recording, truth)]
     chance = np.random.Generator(np.random.PCG64(choices.seed or 0))
@@ -106,7 +106,7 @@ def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
 
 
 def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, imu_noise.TrueMotion]:
-    """The file as it is, and what it tells of the true motion."""
+    """Reads the file as it is, and its true motion."""
     file = arrays.read_npz(source)
     calib = _Calib(source, foreign.json_words(source, file.words("calib")), "calib")
     readings = _readings(file)
@@ -154,7 +154,7 @@ def _readings(file: Arrays) -> Inertial:
 
 
 def _tracks(file: Arrays) -> tuple[Times, Tracks]:
-    """Rows of one time are a frame."""
+    """Returns the tracks, whose rows of one time are a frame."""
     path = file.path
     seconds = file.get("stereo_t", shape=(None,))
     count = len(seconds)
@@ -167,7 +167,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
             path,
             "stereo_t goes back",
             at=f"row {back[0] + 1}",
-            due="rows in order of time are expected",
+            expected="rows in order of time are expected",
         )
     id = file.get("stereo_id", shape=(count,))
     whole = (id == np.floor(id)) & (id >= 0) & (id < 2.0**32)
@@ -177,7 +177,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
             path,
             f"stereo_id is {id[row]:g}",
             at=f"row {row}",
-            due="a whole number below 2^32 is expected",
+            expected="a whole number below 2^32 is expected",
         )
     t_ns, frame = np.unique(np.round(seconds * 1e9).astype(np.int64), return_inverse=True)
     tracks = Tracks.from_rows(
@@ -194,7 +194,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
 
 
 def _only(tracks: Tracks, frames: NDArray[np.bool_]) -> Tracks:
-    """The tracks of these frames, numbered anew."""
+    """Returns the tracks of these frames, renumbered."""
     rows = frames[tracks.frame]
     number = np.cumsum(frames) - 1
     return Tracks(
@@ -214,7 +214,7 @@ def _truth(file: Arrays) -> imu_noise.TrueMotion:
 
 
 def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
-    """x y z w, body to world."""
+    """Returns the rotations of quaternions x y z w, body to world."""
     norms = np.linalg.norm(quaternions, axis=1)
     wrong = np.nonzero(np.abs(norms - 1) > QUATERNION_NORM_TOLERANCE)[0]
     if len(wrong):
@@ -223,7 +223,7 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
             path,
             f"the quaternion's norm is {norms[row]:.4f}",
             at=f"{key} row {row}",
-            due="1 is expected, in the order x y z w",
+            expected="1 is expected, in the order x y z w",
         )
     return np.asarray(Rotation.from_quat(quaternions).as_matrix())
 
@@ -232,7 +232,7 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
 
 
 def _start_time(path: Path, seconds: float, t_ns: Times) -> int:
-    """That of `init`, or of the reading at that very time: a stamp is rounded."""
+    """Returns the time of `init`, or that of the reading at its rounded time."""
     arrays.check_seconds(path, "init[0]", np.array([seconds]))
     told = round(seconds * 1e9)
     nearest = int(t_ns[np.abs(t_ns - told).argmin()])
@@ -241,13 +241,13 @@ def _start_time(path: Path, seconds: float, t_ns: Times) -> int:
             path,
             f"init is of {seconds:.6f} s, the readings of {t_ns[0] * 1e-9:.6f} to "
             f"{t_ns[-1] * 1e-9:.6f} s",
-            due="a state within them is expected",
+            expected="a state within them is expected",
         )
     return nearest if abs(nearest - told) <= SAME_TIME_NS else told
 
 
 def _start(path: Path, t_ns: int, init: Floats, sigmas: StartSigmas) -> Start:
-    """Pose, velocity in body axes and biases (b_a, b_g), with their variances."""
+    """Returns pose, velocity in body axes and biases (b_a, b_g), with their variances."""
     R = _rotations(path, "init", init[None, 1:5])[0]
     pose = np.repeat([sigmas.position_m, sigmas.rotation_rad], 3)
     bias = np.repeat([sigmas.bias_accel_mps2, sigmas.bias_gyro_radps], 3)
@@ -266,7 +266,7 @@ def _start(path: Path, t_ns: int, init: Floats, sigmas: StartSigmas) -> Start:
 
 # --- calib ----------------------------------------------------------------------------------------
 
-NOISES = {  # in a HEADER, and in calib
+NOISES = {  # by name in a HEADER, the name in calib
     "pixel_sigma_px": "pixel_sigma",
     "gyro_noise": "gyro_noise_density",
     "accel_noise": "accel_noise_density",
@@ -296,8 +296,8 @@ class _Calib(Named):
             process=Process.IMU,
         )
 
-    def _wrong(self, key: str, due: str) -> ForeignFileError:
-        return self.error(key, self.get(key), due)
+    def _wrong(self, key: str, expected: str) -> ForeignFileError:
+        return self.error(key, self.get(key), expected)
 
     def _number_or_0(self, key: str) -> float:
         return self.number(key) if key in self else 0.0
@@ -307,7 +307,7 @@ class _Calib(Named):
         return Poses(arrays.rotation(self.path, f"calib: {key}", matrix[:3, :3]), matrix[:3, 3])
 
     def _extrinsic(self, baseline: float) -> Poses:
-        """The left camera's pose in the body; the right one's must be a rectified pair's."""
+        """Returns T_CB of the left camera; the right one must make a rectified pair with it."""
         left = self._pose("T_imu_cam0")
         if "T_imu_cam1" in self.content:
             right = se3.compose(se3.inverse(left), self._pose("T_imu_cam1"))
@@ -325,7 +325,7 @@ class _Calib(Named):
         return left
 
     def _gravity(self) -> float:
-        """Its size; it must point down the world's z."""
+        """Returns gravity's size; it must point down the world's z."""
         g = self.array("gravity_world", 3)
         if not g[2] < 0 or np.abs(g[:2]).max() > GRAVITY_TILT:
             raise self._wrong(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Several sensors of one kind in one file, told apart by a column: ArduPilot's I, an instance.
+"""Separates several sensors of one kind in one file by a column, like ArduPilot's I (instance).
 
-Rows of one time are then of different sensors. The column that tells them apart holds few whole
-numbers or words, each of them at most once at any time.
+Rows of one time are then of different sensors. That column has few whole numbers or words, each of
+them at most once at any time.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from pelorus.foreign import BAD_ROWS_MAX, ForeignFileError
 from pelorus.table import Table
 
 SENSORS_MAX = 16
-UNNAMED_MAX = 4  # of a column with another name, which may as well count the readings of a batch
+UNNAMED_MAX = 4  # in a column of any name, which may as well count the readings of a batch
 NAMES = ("i", "instance", "imu", "sensor", "sensor_id", "device_id", "multi_id", "id")
-UNLIKE = 2.0  # times: as much more rows of one time differ than rows one after the other
+UNLIKE = 2.0  # ratio of differences between rows of one time and successive rows
 
 
-class Asked(NamedTuple):
-    """COLUMN=VALUE: the rows to be taken, of one file (imu) or of all that have the column."""
+class AskedRows(NamedTuple):
+    """COLUMN=VALUE: the rows to keep, in one file (imu) or in all that have the column."""
 
     file: str
     column: str
     value: str
 
     @classmethod
-    def of(cls, words: str) -> Asked:
+    def of(cls, words: str) -> AskedRows:
         name, equals, value = words.partition("=")
         file, dot, column = name.strip().rpartition(".")
         if not (equals and column and value.strip()):
@@ -38,14 +38,14 @@ class Asked(NamedTuple):
         return cls(file if dot else "", column, value.strip())
 
 
-def take(table: Table, asked: list[Asked]) -> None:
-    """Keep the rows of one sensor: the one asked for, else the first one, which is said."""
+def take(table: Table, asked: list[AskedRows]) -> None:
+    """Keeps the rows of one sensor: the one asked for, else the first one, with a remark."""
     for one in asked:
         cells = np.array([cell.strip() for cell in table.cells(one.column)])
         if not (cells == one.value).any():
             there = ", ".join(_first_values(cells))
             raise ForeignFileError(
-                table.path, f"no row has {one.column} = {one.value}", due=f"there are: {there}"
+                table.path, f"no row has {one.column} = {one.value}", expected=f"there are: {there}"
             )
         table.keep(cells == one.value)
     if asked or not table.has_times or not table.count:
@@ -74,7 +74,7 @@ def _first_values(cells: NDArray[np.str_]) -> list[str]:
 
 
 def _telling(table: Table, t_ns: NDArray[np.int64]) -> str | None:
-    """The column that tells the rows of one time apart; of several the one with such a name."""
+    """Returns the column that separates the rows of one time; a usual name is preferred."""
     found = []
     for name in table.names:
         cells = np.array([cell.strip() for cell in table.cells(name)])
@@ -90,14 +90,14 @@ def _telling(table: Table, t_ns: NDArray[np.int64]) -> str | None:
 
 
 def _may_name(value: str) -> bool:
-    """A whole number or a word, as a sensor is called."""
+    """Returns whether the value is a whole number or a word, as sensors are called."""
     return value.isdecimal() or (value.replace("_", "").isalnum() and not value[:1].isdecimal())
 
 
 def _require_one_sensor(table: Table, t_ns: NDArray[np.int64]) -> None:
-    """Refuse rows that are of several sensors in turn, which no column tells apart.
+    """Refuses rows of several sensors that no column separates.
 
-    Readings of one sensor that share a stamp differ no more than those that follow each other.
+    Readings of one sensor that share a stamp differ no more than successive ones.
     """
     count = np.unique(t_ns, return_counts=True)[1]
     each = int(np.median(count))
@@ -115,7 +115,7 @@ def _require_one_sensor(table: Table, t_ns: NDArray[np.int64]) -> None:
         raise ForeignFileError(
             table.path,
             f"{each} rows have one time and differ as those of {each} sensors",
-            due="a column that tells the sensors apart is expected (--rows COLUMN=VALUE takes "
+            expected="a column that tells the sensors apart is expected (--rows COLUMN=VALUE takes "
             "one of "
             "them), or a file for each",
         )

@@ -36,14 +36,14 @@ OXTS_NUMBERS = 30
 RAW_PAIRS = (("image_00", "image_01"), ("image_02", "image_03"))
 ODOMETRY_PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))
 AHEAD = np.array([[0, -1.0, 0], [0, 0, -1], [1, 0, 0]])  # of a body x forward, y left, z up
-# The attitude that a truth begins with is known to 0.01 rad at best: else NEES is the truth's.
+# The truth's first attitude is known to 0.01 rad at best: a smaller sigma would spoil NEES.
 OF_TRUTH = {"start-sigma": 0.01}
-# Of an OXTS packet.
+# Columns of an OXTS packet.
 LAT, LON, ALT, ROLL, PITCH, YAW, VF, WX = 0, 1, 2, 3, 4, 5, 8, 17
 
 
 class Made(NamedTuple):
-    """White noise of twists that are made from the truth, where a drive has none of its own."""
+    """White noise of twists that are made from the truth, for drives that have none."""
 
     velocity_sigma_mps: float = 0.5
     gyro_sigma_radps: float = 0.05
@@ -52,7 +52,7 @@ class Made(NamedTuple):
 
 @dataclass(frozen=True)
 class _Folder:
-    """The two cameras' folders, and the numbers by which the calibration calls them."""
+    """The two cameras' folders, and their numbers in the calibration."""
 
     path: Path
     left: str
@@ -64,12 +64,12 @@ class _Folder:
 
 
 def is_raw(folder: Path) -> bool:
-    """Whether it is a raw drive: its inertial measurements lie in oxts."""
+    """Returns whether it is a raw drive: these have inertial measurements in oxts."""
     return (folder / "oxts").is_dir()
 
 
 def read(folder: Path, asked: Asked, made: Made) -> Streams:
-    """A raw drive or a sequence of the odometry benchmark."""
+    """Reads a raw drive or a sequence of the odometry benchmark."""
     found = _raw(folder, asked) if is_raw(folder) else _odometry(folder, asked, made)
     own = found.truth is not None and asked.truth is None
     return replace(found, settings=OF_TRUTH) if own else found
@@ -90,21 +90,21 @@ def _raw(folder: Path, asked: Asked) -> Streams:
 
 
 def _raw_rig(date: Path, cameras: _Folder) -> Rig:
-    """Of the rectified pictures; the body is the OXTS unit's: x forward, y left, z up."""
+    """Returns the rig of the rectified pictures; the body is the OXTS unit: forward, left, up."""
     path = date / "calib_cam_to_cam.txt"
-    cam = _Calib(path)
+    cam = _KittiCalib(path)
     first, second = cameras.numbers
     P = [cam.array(f"P_rect_{k:02d}", 3, 4) for k in (first, second)]
     size = cam.array(f"S_rect_{first:02d}", 2)
     R_rect = Poses(_near(path, "R_rect_00", cam.array("R_rect_00", 3, 3)), np.zeros(3))
-    velo = _Calib(date / "calib_velo_to_cam.txt").pose()
-    imu = _Calib(date / "calib_imu_to_velo.txt").pose()
+    velo = _KittiCalib(date / "calib_velo_to_cam.txt").pose()
+    imu = _KittiCalib(date / "calib_imu_to_velo.txt").pose()
     T_LB = se3.compose(se3.compose(se3.compose(_shift(P[0]), R_rect), velo), imu)
     return replace(_rectified(path, P, (int(size[0]), int(size[1]))), T_LB=T_LB)
 
 
 def _oxts(folder: Path) -> tuple[Floats, Times]:
-    """(n, 30) numbers, and their times."""
+    """Returns (n, 30) numbers, and their times."""
     files = sorted((folder / "data").glob("*.txt"))
     if not files:
         raise PelorusError(f"{folder / 'data'}: holds no OXTS packet (0000000000.txt and so on)")
@@ -116,14 +116,14 @@ def _oxts(folder: Path) -> tuple[Floats, Times]:
 
 
 def _oxts_twists(where: Path, t_ns: Times, packets: Floats) -> Twists:
-    """Velocities are told over the level ground (forward, left, up); the body rolls and pitches."""
+    """Returns body velocities: OXTS has them over level ground (forward, left, up)."""
     level = packets[:, VF : VF + 3]
     tilt = Rotation.from_euler("YX", packets[:, [PITCH, ROLL]])
     return Twists(where, t_ns, tilt.inv().apply(level), packets[:, WX : WX + 3])
 
 
 def _oxts_poses(packets: Floats) -> Poses:
-    """East, north, up from the first packet on; Mercator at its latitude, as KITTI's devkit."""
+    """Returns poses east, north, up of the first packet, by Mercator as KITTI's devkit."""
     scale = np.cos(np.radians(packets[0, LAT]))
     east = scale * EARTH_M * np.radians(packets[:, LON])
     north = scale * EARTH_M * np.log(np.tan(np.radians(90 + packets[:, LAT]) / 2))
@@ -133,11 +133,13 @@ def _oxts_poses(packets: Floats) -> Poses:
 
 
 def _stamps(path: Path, count: int) -> Times:
-    """2011-09-30 12:40:25.069324302, a row each."""
+    """Returns the times in a file with a row like 2011-09-30 12:40:25.069324302 each."""
     lines = [line.strip() for line in foreign.text(path).splitlines() if line.strip()]
     if len(lines) != count:
         raise ForeignFileError(
-            path, f"has {len(lines)} times", due=f"{count} are expected, one for each file in data"
+            path,
+            f"has {len(lines)} times",
+            expected=f"{count} are expected, one for each file in data",
         )
     t_ns = np.array([_stamp(path, k, line) for k, line in enumerate(lines, 1)], np.int64)
     back = np.nonzero(np.diff(t_ns) <= 0)[0]
@@ -152,9 +154,9 @@ def _stamp(path: Path, line: int, words: str) -> int:
         seconds = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
         return int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
     except ValueError:
-        due = "2011-09-30 12:40:25.069324302 or such is expected"
+        expected = "2011-09-30 12:40:25.069324302 or such is expected"
         raise ForeignFileError(
-            path, f"{words[:40]!r} is no time", at=f"line {line}", due=due
+            path, f"{words[:40]!r} is no time", at=f"line {line}", expected=expected
         ) from None
 
 
@@ -164,7 +166,7 @@ def _stamp(path: Path, line: int, words: str) -> int:
 def _odometry(folder: Path, asked: Asked, made: Made) -> Streams:
     cameras = _cameras(folder, ODOMETRY_PAIRS)
     path = folder / "calib.txt"
-    calib = _Calib(path)
+    calib = _KittiCalib(path)
     P = [calib.array(f"P{k}", 3, 4) for k in cameras.numbers]
     rig = replace(_rectified(path, P, (0, 0)), T_LB=Poses(AHEAD, np.zeros(3)))
     pairs = images.pairs(folder / cameras.left, folder / cameras.right)
@@ -198,7 +200,7 @@ def _poses_file(folder: Path) -> Path:
 
 
 def _poses(folder: Path, t_ns: Times, P: Floats, calibrated: Calibrated) -> Trajectory | None:
-    """Those of camera 0, brought to the body; row k is frame k."""
+    """Returns the poses of camera 0, moved to the body; row k is frame k."""
     path = _poses_file(folder)
     if not path.is_file():
         return None
@@ -212,7 +214,7 @@ def _poses(folder: Path, t_ns: Times, P: Floats, calibrated: Calibrated) -> Traj
 
 
 def _made_twists(where: Path, truth: Trajectory, made: Made) -> Twists:
-    """What moves each pose to the next one, and noise; a reading holds from its time on."""
+    """Returns noisy twists that move each pose to the next; a reading holds from its time on."""
     if min(made.velocity_sigma_mps, made.gyro_sigma_radps) < 0 or made.seed < 0:
         raise PelorusError("--velocity-sigma, --gyro-sigma and --seed: none may be negative")
     rate = motion.rates(truth.t_ns, truth.poses)
@@ -254,7 +256,7 @@ def _pictures(pairs: list[images.Pair], t_ns: Times) -> Pictures:
 
 
 def _shift(P: Floats) -> Poses:
-    """From the rectified camera 0 to the one of this projection, which stands beside it."""
+    """Returns the pose of the camera of this projection beside rectified camera 0."""
     return Poses(np.eye(3), np.array([P[0, 3] / P[0, 0], P[1, 3] / P[1, 1], P[2, 3]]))
 
 
@@ -263,7 +265,7 @@ def _rectified(path: Path, P: list[Floats], size: tuple[int, int]) -> Rig:
     baseline = P[0][0, 3] / P[0][0, 0] - P[1][0, 3] / P[1][0, 0]
     if min(P[0][0, 0], P[0][1, 1], baseline) <= 0:
         raise ForeignFileError(path, "has no positive focal length and baseline")
-    # what the second one is off by in y and z is less than a tenth of a pixel
+    # the second camera's offset in y and z is less than a tenth of a pixel
     T_RL = Poses(np.eye(3), np.array([-float(baseline), 0.0, 0.0]))
     return Rig.of_cameras(path, lenses[0], replace(lenses[0]), T_RL)
 
@@ -272,8 +274,8 @@ def _near(path: Path, name: str, R: Floats) -> Floats:
     return se3.nearest_rotation(arrays.rotation(path, name, R))
 
 
-class _Calib:
-    """Lines of NAME: numbers."""
+class _KittiCalib:
+    """A file with lines of NAME: numbers."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -283,7 +285,7 @@ class _Calib:
     def array(self, name: str, *shape: int) -> Floats:
         if name not in self._lines:
             there = ", ".join(self._lines) or "none"
-            raise ForeignFileError(self.path, f"lacks {name}", due=f"there are: {there}")
+            raise ForeignFileError(self.path, f"lacks {name}", expected=f"there are: {there}")
         try:
             numbers = np.array(self._lines[name], np.float64)
         except ValueError:
@@ -292,10 +294,10 @@ class _Calib:
             raise ForeignFileError(
                 self.path,
                 f"{name} has {numbers.size} numbers",
-                due=f"{int(np.prod(shape))} finite ones are expected",
+                expected=f"{int(np.prod(shape))} finite ones are expected",
             )
         return numbers.reshape(shape)
 
     def pose(self) -> Poses:
-        """R and T."""
+        """Returns the pose of R and T."""
         return Poses(_near(self.path, "R", self.array("R", 3, 3)), self.array("T", 3))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A map of landmarks from CSV, to be localised in.
+"""Reads a map of landmarks from CSV, in which to localise.
 
 Columns: id, x_m, y_m, z_m in the world, and either sigma_m (the same along all axes) or the
 covariance cov_xx_m2, cov_yx_m2, cov_yy_m2, cov_zx_m2, cov_zy_m2, cov_zz_m2; optional frame, which
-must say world. The ids must be those under which the front end will see the landmarks again.
+must be world. The ids must be those under which the front end will see the landmarks again.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ POSITION = ("x_m", "y_m", "z_m")
 SIGMA = "sigma_m"
 COVARIANCE = ("cov_xx_m2", "cov_yx_m2", "cov_yy_m2", "cov_zx_m2", "cov_zy_m2", "cov_zz_m2")
 WORLD = "world"
-ROUNDING = 1e-9  # of the largest variance: so much below zero may a direction be
+ROUNDING = 1e-9  # of the largest variance: rounding that a negative variance may be
 
 
-class Points(NamedTuple):
-    """Landmarks as the file has them: `row` is where each stands in it."""
+class MapPoints(NamedTuple):
+    """Landmarks as the file has them; `row` is each one's row in it."""
 
     id: NDArray[np.int64]
     p_W_m: Floats  # (n, 3)
@@ -41,7 +41,7 @@ class Points(NamedTuple):
 
 
 def convert(source: Path, like: Path) -> Recording:
-    """A recording without data: the HEADER of `like`, and the landmarks as known ones."""
+    """Returns a recording without data: the HEADER of `like`, and the landmarks as known ones."""
     received, _ = wire.read_file(like)
     header = wire.header_of(received, like)
     points = _csv(source)
@@ -60,7 +60,7 @@ def _without_data(header: Header, known: list[Landmark]) -> Recording:
     return Recording(header, never, none, none, never, nothing, known=known)
 
 
-def _csv(path: Path) -> Points:
+def _csv(path: Path) -> MapPoints:
     table = Table.read(path)
     p = table.numbers(*POSITION)
     if not len(p):
@@ -77,10 +77,10 @@ def _csv(path: Path) -> Points:
         raise ForeignFileError(
             path,
             "says nothing of how certain its landmarks are",
-            due=f"a column {SIGMA}, or {', '.join(COVARIANCE)}, is expected",
+            expected=f"a column {SIGMA}, or {', '.join(COVARIANCE)}, is expected",
         )
     id = table.integers("id", ID_MAX)
-    return Points(id, p, P, np.arange(len(p)) + table.first_row)
+    return MapPoints(id, p, P, np.arange(len(p)) + table.first_row)
 
 
 def _require_world(path: Path, table: Table) -> None:
@@ -90,12 +90,12 @@ def _require_world(path: Path, table: Table) -> None:
                 path,
                 f"the landmark is in the frame {frame!r}",
                 at=f"row {row}",
-                due="landmarks in the world's are expected",
+                expected="landmarks in the world's are expected",
             )
 
 
-def _check(path: Path, points: Points) -> None:
-    """Refuse ids that stand twice, and what is no covariance."""
+def _check(path: Path, points: MapPoints) -> None:
+    """Refuses duplicate ids, and matrices that are no covariance."""
     _, first, count = np.unique(points.id, return_index=True, return_counts=True)
     if (count > 1).any():
         id = points.id[first[count > 1][0]]
@@ -103,7 +103,7 @@ def _check(path: Path, points: Points) -> None:
         raise ForeignFileError(
             path,
             f"the id {id} stands {len(rows)} times: rows {rows[0]} and {rows[1]}",
-            due="which one is right cannot be told; one each is expected",
+            expected="which one is right cannot be told; one each is expected",
         )
     P = points.covariance
     variances = np.diagonal(P, axis1=1, axis2=2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rates of turn that come later than the velocities beside them, moved to where they belong."""
+"""Moves rates of turn that come later than the velocities beside them to their true times."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ LATE_MOST_S = 2.0
 
 
 def convert(source: Path, late_s: float, target: Path) -> int:
-    """The recording with the rates of turn `late_s` earlier, all else as it is; how many there are.
+    """Writes the recording with the rates of turn `late_s` earlier; returns their number.
 
-    Between two readings a rate is on the line through them; after the last one it stays.
+    Rates are interpolated between two readings; after the last one they stay constant.
     """
     if not 0 < abs(late_s) <= LATE_MOST_S:
         raise PelorusError(

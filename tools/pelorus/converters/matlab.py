@@ -27,7 +27,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 
-LANDMARK_SIGMA_M = 0.01  # Starry Night's map was surveyed by a motion capture system
+LANDMARK_SIGMA_M = 0.01  # Starry Night's map was surveyed by motion capture
 
 
 def starry_night(
@@ -35,7 +35,7 @@ def starry_night(
     twist_timing: TwistTiming = TwistTiming.START,
     landmark_sigma_m: float = LANDMARK_SIGMA_M,
 ) -> Recording:
-    """With the noise variances of the file and its landmarks as LANDMARK(known)."""
+    """Reads a drive with the noise variances of the file and its landmarks as LANDMARK(known)."""
     file = arrays.read_mat(source)
     recording = _read(file, twist_timing)
     if not 0 < landmark_sigma_m < np.inf:
@@ -52,7 +52,7 @@ def starry_night(
 
 
 def klt(source: Path, twist_timing: TwistTiming = TwistTiming.MID) -> Recording:
-    """With the OXTS poses of the file as TRUTH."""
+    """Reads a drive with the OXTS poses of the file as TRUTH."""
     return _read(arrays.read_mat(source), twist_timing)
 
 
@@ -75,13 +75,13 @@ def _read(file: Arrays, twist_timing: TwistTiming) -> Recording:
         name=header_name(file.path.stem),
     )
     v, w = (_first(file, key, count) for key in ("v_vk_vk_i", "w_vk_vk_i"))
-    turns = Rotation.from_rotvec(rotation_vectors.copy())  # which takes no read-only array
+    turns = Rotation.from_rotvec(rotation_vectors.copy())  # it refuses read-only arrays
     truth = Poses(turns.as_matrix(), position)
     return Recording(header, t_ns, v, w, t_ns, tracks, t_ns, truth)
 
 
 def _first(file: Arrays, key: str, count: int) -> Floats:
-    """(count, 3) of a (3, T') array, T' >= count."""
+    """Returns the first (count, 3) of a (3, T') array, T' >= count."""
     array = file.get(key, shape=(3, None))
     if array.shape[1] < count:
         raise ForeignFileError(
@@ -91,7 +91,7 @@ def _first(file: Arrays, key: str, count: int) -> Floats:
 
 
 def _features(file: Arrays, count: int) -> Floats:
-    """(4, M, T), whichever way round the file has it."""
+    """Returns (4, M, T) features, whichever axis order the file has."""
     y = file.get("y_k_j", shape=(4, None, None))
     if y.shape[1] == y.shape[2] == count:
         raise ForeignFileError(file.path, f"y_k_j is 4 x {count} x {count}: which axis is time?")
@@ -102,12 +102,12 @@ def _features(file: Arrays, count: int) -> Floats:
     raise ForeignFileError(
         file.path,
         f"y_k_j has the shape {y.shape}, but t has {count} times",
-        due=f"4 x {count} x n or 4 x n x {count} is expected",
+        expected=f"4 x {count} x n or 4 x n x {count} is expected",
     )
 
 
 def _noise(file: Arrays) -> Noise:
-    """The sigmas: roots of the mean of w_var (angular), v_var (linear velocity), y_var (pixels).
+    """Returns the sigmas: roots of the means of w_var (angular), v_var (linear), y_var (pixels).
 
     One for all axes: w_var is largest about the axis that turned most. The readings are late, so
     their error is where the rate changes, and that can be about any axis (docs/MATH.md 17).
@@ -118,6 +118,6 @@ def _noise(file: Arrays) -> Noise:
             raise ForeignFileError(
                 file.path,
                 f"{key} is {variance}",
-                due="variances that are not negative are expected",
+                expected="variances that are not negative are expected",
             )
     return Noise(*(float(np.sqrt(np.mean(variance))) for variance in variances.values()))

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The order of a bag's stamps: what is merely late is put in its place, a clock that was set back
-is told.
+"""Sorts a bag's messages by their stamps, and refuses a clock that was set back.
 
-After it was set back two stretches of the drive have the same times. Where a recorder's messages
-stand as they came, the stamps go back. Where they were sorted by their arrival, which the same
-clock told, they are interleaved like the teeth of two combs, each with the period of the stream.
+After it was set back two stretches of the drive have the same times. Where messages stand as they
+came, the stamps go back. Where a recorder sorted them by arrival, which the same clock gave, they
+are interleaved like the teeth of two combs, each with the period of the stream.
 """
 
 from __future__ import annotations
@@ -22,16 +21,17 @@ from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 from pelorus.motion import Times
 
-TWICE = 1.5  # times as many messages as fit into a time that is covered once; covered twice: 2
-TEETH_MIN = 8  # in a stretch, to tell two combs from a stumble of the driver
-SAME_PERIOD = 0.1  # of it, inside and outside of the stretch
-CHANCE = 1e-6  # that one drive looks like two
-COMBS_SIGMA = 5.0  # that the steps differ in turn, and not by chance
+TWICE = 1.5  # ratio of messages in a time that is covered twice to one covered once
+TEETH_MIN = 8  # messages that a stretch needs, so that two combs are no stumble of the driver
+SAME_PERIOD = 0.1  # tolerance of the period inside and outside the stretch
+CHANCE = 1e-6  # probability that one drive looks like two
+COMBS_SIGMA = 5.0  # by which steps alternate
 
 
 class SetBack(NamedTuple):
-    """By how much, and at which message; what arrived until the one time or from the other on is of
-    one drive.
+    """A clock that was set back: by how much, and at which message.
+
+    What arrived until the first time, or from the second on, is of one drive.
     """
 
     by_ns: int
@@ -41,7 +41,7 @@ class SetBack(NamedTuple):
 
 
 class Stamps(NamedTuple):
-    """Of messages as they stand in the file; `numbers` are what they hold, where they hold any."""
+    """Stamps of messages as they stand in the file, with their numbers, where they hold any."""
 
     t_ns: Times
     arrival_ns: Times
@@ -55,28 +55,28 @@ class Stamps(NamedTuple):
 def sound(
     bag: Bag, topic: str, t_ns: Times, numbers: Floats, remarks: list[str]
 ) -> NDArray[np.bool_]:
-    """Which messages have a time and finite numbers; refused where too many have not."""
+    """Returns which messages have a time and finite numbers; refuses too many bad ones."""
     timed = ~arrays.never_set(t_ns) if t_ns.any() else np.zeros(len(t_ns), np.bool_)
     finite = np.isfinite(numbers).all(axis=1)
-    due = "times in header.stamp are expected, or --stamps log: those of the messages' arrival"
-    leave_out(bag, topic, int((~timed).sum()), len(t_ns), "headers have no time", remarks, due)
+    expected = "times in header.stamp are expected, or --stamps log: those of the messages' arrival"
+    leave_out(bag, topic, int((~timed).sum()), len(t_ns), "headers have no time", remarks, expected)
     wrong = "messages hold a number that is not finite"
     leave_out(bag, topic, int((~finite).sum()), len(t_ns), wrong, remarks)
     return np.asarray(timed & finite)
 
 
 def leave_out(
-    bag: Bag, topic: str, bad: int, count: int, wrong: str, remarks: list[str], due: str = ""
+    bag: Bag, topic: str, bad: int, count: int, wrong: str, remarks: list[str], expected: str = ""
 ) -> None:
-    """Say that so many of so many are left out; refuse if they are too many."""
+    """Remarks that `bad` of `count` messages are left out; refuses too many."""
     if bad > foreign.BAD_ROWS_MAX * count:
-        raise ForeignFileError(bag.path, f"{bad} of {count} {wrong}", at=topic, due=due)
+        raise ForeignFileError(bag.path, f"{bad} of {count} {wrong}", at=topic, expected=expected)
     if bad:
         remarks.append(f"{topic}: {bad} of {count} {wrong}: left out")
 
 
 def spread(topic: str, given: Stamps, remarks: list[str]) -> Stamps:
-    """The readings with times of their own where a driver gives a batch of them one stamp."""
+    """Returns the readings with times of their own where a driver gives a batch one stamp."""
     t_ns, numbers = given.t_ns, given.numbers
     if numbers is None or (np.diff(t_ns) < 0).any():
         return given
@@ -92,8 +92,9 @@ def spread(topic: str, given: Stamps, remarks: list[str]) -> Stamps:
 
 
 def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray[np.intp]:
-    """Which messages are taken: in the order of time, the first of those of one time. A clock that
-    was set back is refused.
+    """Returns the messages to take, in the order of time; of those of one time the first.
+
+    Refuses a clock that was set back.
     """
     t_ns = given.t_ns
     found = _written_back(given) or _interleaved(given.at(_without_copies(given)))
@@ -105,8 +106,8 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
             bag.path,
             f"stamps go back by {found.by_ns / NS:.4g} s at message {found.message}",
             at=topic,
-            due="was a clock set back, or are two recordings in one bag? Each must be converted "
-            f"alone: --until {math.floor(until * 1e3) / 1e3:.3f} takes the first, "
+            expected="was a clock set back, or are two recordings in one bag? Each must be "
+            f"converted alone: --until {math.floor(until * 1e3) / 1e3:.3f} takes the first, "
             f"--from {math.ceil(later * 1e3) / 1e3:.3f} the second; if only the sensor's clock was "
             "set, --stamps log is expected",
         )
@@ -124,7 +125,7 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
                 bag.path,
                 f"{other} of {len(t_ns)} messages have other numbers at the time of the one before",
                 at=topic,
-                due="a stamp for each reading is expected, or --stamps log",
+                expected="a stamp for each reading is expected, or --stamps log",
             )
     if len(times) < len(t_ns):
         remarks.append(f"{topic}: {len(t_ns) - len(times)} messages repeat a time and are left out")
@@ -132,7 +133,7 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
 
 
 def _written_back(given: Stamps) -> SetBack | None:
-    """Where stamps go back and the time behind is covered a second time."""
+    """Returns a clock set back where stamps go back and the time after is covered a second time."""
     t_ns, arrival_ns, _ = given
     latest = np.maximum.accumulate(t_ns)
     late = t_ns < latest
@@ -149,8 +150,9 @@ def _written_back(given: Stamps) -> SetBack | None:
 
 
 def _without_copies(given: Stamps) -> NDArray[np.intp]:
-    """In the order of time, without messages that are there twice, as in a bag of two recorders;
-    without numbers to compare, without all that repeat a time.
+    """Returns the order of time, without duplicate messages, as from two recorders.
+
+    Without numbers to compare, all that repeat a time are left out.
     """
     order, numbers = np.argsort(given.t_ns, kind="stable"), given.numbers
     same = np.diff(given.t_ns[order]) == 0
@@ -160,7 +162,10 @@ def _without_copies(given: Stamps) -> NDArray[np.intp]:
 
 
 def _interleaved(given: Stamps) -> SetBack | None:
-    """Of sorted stamps: a stretch twice as dense as the rest, of two combs or of two drives."""
+    """Returns a clock set back if sorted stamps are twice as dense in a stretch.
+
+    There they must form two combs, or numbers of two drives.
+    """
     t_ns, arrival_ns, numbers = given
     steps = np.diff(t_ns).astype(np.float64)
     if len(steps) < 2 * TEETH_MIN:
@@ -184,16 +189,16 @@ def _interleaved(given: Stamps) -> SetBack | None:
 
 
 def _are_combs(steps: Floats) -> bool:
-    """Whether steps are short and long in turn."""
+    """Returns whether steps alternate between short and long."""
     even, odd = steps[::2], steps[1::2]
     chance = np.sqrt(even.var() / len(even) + odd.var() / len(odd))
     return bool(abs(even.mean() - odd.mean()) > max(COMBS_SIGMA * chance, 1))
 
 
 def _are_two_drives(numbers: Floats) -> bool:
-    """Whether each message is less like the next one than like the one after that.
+    """Returns whether messages resemble the second next one more than the next one.
 
-    Of one drive it is as much like it, by noise alone, or more.
+    In one drive they resemble the next one as much, but for noise, or more.
     """
     scale = np.maximum(numbers.std(axis=0), np.finfo(float).tiny)
     near, far = (float(np.sum((np.diff(x, axis=0) / scale) ** 2)) for x in (numbers, numbers[::2]))

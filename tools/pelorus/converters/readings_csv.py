@@ -24,7 +24,7 @@ VALUE_MAX, SIGMA_MAX, ARM_MAX_M = PLAUSIBLE["VALUE"], 1e6, 1e3
 
 
 def columns_of(sensor: SmallSensor) -> str:
-    """What such a file holds, in a sentence."""
+    """Returns a sentence on the columns of such a file."""
     numbers = ", ".join(sensor.columns.values())
     sigmas = ", ".join(dict.fromkeys(_shared(sensor, letter) for letter in sensor.letters))
     if sensor.at_rest:
@@ -36,7 +36,7 @@ def columns_of(sensor: SmallSensor) -> str:
 
 
 def read(table: Table, sensor: SmallSensor) -> list[Reading]:
-    """The file's rows."""
+    """Returns the readings of the file's rows."""
     path = table.path
     table.leave_out_bad(*(name for name in _known(sensor) if table.has(name)))
     t_ns = table.ascending_times()
@@ -51,8 +51,8 @@ def read(table: Table, sensor: SmallSensor) -> list[Reading]:
         if not sensor.at_rest:
             value[:, k] = _within(table, column, VALUE_MAX)
     if not measured:
-        due = f"some of {', '.join(_wanted(sensor))} are expected"
-        raise ForeignFileError(path, "measures nothing", due=due)
+        expected = f"some of {', '.join(_wanted(sensor))} are expected"
+        raise ForeignFileError(path, "measures nothing", expected=expected)
     arm = np.zeros((len(t_ns), 3))
     if sensor.has_arm and any(table.has(name) for name in ARM):
         table.require(*ARM)
@@ -63,26 +63,26 @@ def read(table: Table, sensor: SmallSensor) -> list[Reading]:
 
 
 def _known(sensor: SmallSensor) -> list[str]:
-    """All columns of numbers that such a file may have."""
+    """Returns all columns of numbers that such a file may have."""
     shared = [_shared(sensor, letter) for letter in sensor.letters]
     own = list(sensor.columns.values())
     return list(dict.fromkeys((*own, *shared, *(f"sigma_{name}" for name in own), *ARM)))
 
 
 def _wanted(sensor: SmallSensor) -> list[str]:
-    """One of these columns there must be."""
+    """Returns the columns of which at least one is needed."""
     if sensor.at_rest:
         return [_shared(sensor, letter) for letter in sensor.letters]
     return list(sensor.columns.values())
 
 
 def _shared(sensor: SmallSensor, letter: str) -> str:
-    """The column of one sigma for all numbers of this one's unit."""
+    """Returns the column of one sigma for all numbers of this one's unit."""
     return f"sigma_{sensor.unit(letter)}"
 
 
 def _sigma_column(table: Table, sensor: SmallSensor, letter: str) -> str:
-    """The sigma's column that there is; nothing if there is none."""
+    """Returns the existing column of the sigma; empty if there is none."""
     names = (f"sigma_{sensor.columns[letter]}", _shared(sensor, letter))
     return next((name for name in names if table.has(name)), "")
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Simulated tracks drawn anew: other ids, other noise of the pixels, the same drive.
+"""Draws simulated tracks anew: with other ids and other pixel noise, for the same drive.
 
 A simulator's landmarks keep their id when they come back, which no tracker does: a new id after a
-frame's absence imitates one. And where the true poses are known, a simulated recording can be
-drawn again: each landmark is put where all of its observations together see it, projected into
-every frame that has it, and gets fresh noise. That these places are not those of the first draw
-does no harm: they are a world as good as any.
+frame's absence imitates one. And where the true poses are known, a simulated recording can be drawn
+again: each landmark is put where all of its observations together see it, projected into every
+frame that has it, and gets fresh noise. These places are not those of the first draw, but make as
+good a world.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from pelorus.trajectory import Trajectory
 PASSES = 8  # of Gauss-Newton: a point from stereo is near
 DISPARITY_MIN_PX = 0.5
 DEPTH_MIN_M = 0.1
-FLOOR = 1e-6  # px^2/m^2: of a point at 1 km stereo alone gives 1e-3
-MISFIT_MAX = 1.5  # times pixel sigma: beyond that the tracks are not those of fixed points
+FLOOR = 1e-6  # px^2/m^2: a point at 1 km has 1e-3 by stereo alone
+MISFIT_MAX = 1.5  # ratio to pixel sigma beyond which the tracks are not of fixed points
 
 
 def with_new_ids(tracks: Tracks, chance: np.random.Generator | None = None) -> Tracks:
-    """Each unbroken run of frames has an id of its own: in the order of beginning, or at random."""
+    """Gives each unbroken run of frames its own id: in the order of beginning, or at random."""
     order = np.lexsort((tracks.frame, tracks.id))
     frame, id = tracks.frame[order], tracks.id[order]
     begins = np.ones(len(order), bool)
@@ -48,7 +48,7 @@ def with_new_ids(tracks: Tracks, chance: np.random.Generator | None = None) -> T
 
 
 def with_noise(recording: Recording, sigma_px: float, chance: np.random.Generator) -> Recording:
-    """More noise than there is; the HEADER's sigma is that of both."""
+    """Adds noise; the HEADER's sigma covers that and the old one."""
     tracks, noise = recording.tracks, recording.header.noise
     pixels = tracks.pixels + sigma_px * chance.standard_normal(tracks.pixels.shape)
     whole = float(np.hypot(noise.pixel_sigma_px, sigma_px))
@@ -59,7 +59,7 @@ def with_noise(recording: Recording, sigma_px: float, chance: np.random.Generato
 def renew(
     source: Path, recording: Recording, chance: np.random.Generator
 ) -> tuple[Recording, Finding]:
-    """Fresh noise of the HEADER's pixel sigma on where the landmarks truly are seen."""
+    """Returns the recording with fresh noise of the HEADER's sigma on the true pixels."""
     tracks, sigma = recording.tracks, recording.header.noise.pixel_sigma_px
     T_CW = _camera_poses(source, recording)
     whose, landmarks = np.unique(tracks.id, return_inverse=True)
@@ -91,12 +91,12 @@ def _no_fixed_points(source: Path, why: str) -> ForeignFileError:
         source,
         "its observations are not those of points that stand still, seen from the true poses: "
         f"{why}",
-        due="a simulated recording is expected for --seed",
+        expected="a simulated recording is expected for --seed",
     )
 
 
 def _camera_poses(source: Path, recording: Recording) -> Poses:
-    """World to left camera, of every observation."""
+    """Returns world to left camera for every observation."""
     frames = Trajectory(recording.frame_t_ns, Poses(np.empty((0, 3, 3)), np.empty((0, 3))))
     truth = Trajectory(recording.truth_t_ns, recording.truth)
     mine, theirs = evaluation.match(frames, truth, 0)
@@ -104,19 +104,19 @@ def _camera_poses(source: Path, recording: Recording) -> Poses:
         raise ForeignFileError(
             source,
             f"{len(recording.frame_t_ns) - len(mine)} frames have no truth of their time",
-            due="for --seed one each is expected",
+            expected="for --seed one each is expected",
         )
     poses = se3.compose(recording.T_CB, se3.inverse(recording.truth.at(theirs)))
     return poses.at(recording.tracks.frame)
 
 
 def _points(camera: Camera, tracks: Tracks, T_CW: Poses, landmarks: Indices) -> Floats:
-    """(landmarks, 3) in the world: least squares over all of its pixels."""
+    """Returns the landmarks (n, 3) in the world, by least squares over all of their pixels."""
     T_WC = se3.inverse(T_CW)
     u_left, v_left, u_right, v_right = tracks.pixels.T
     near = np.maximum(u_left - u_right, DISPARITY_MIN_PX)
     seen = triangulate(camera, np.stack((u_left, v_left, u_left - near, v_right), axis=-1))
-    # far points of noisy disparity count little: their depth's variance goes with depth^4
+    # far points with noisy disparity count little: the variance of depth grows with depth^4
     weight = 1 / seen[:, 2] ** 4
     points = (
         _sums(landmarks, weight[:, None] * se3.apply(T_WC, seen))
@@ -129,13 +129,13 @@ def _points(camera: Camera, tracks: Tracks, T_CW: Poses, landmarks: Indices) -> 
         r = tracks.pixels - project(camera, q)
         N = _sums(landmarks, np.einsum("nki,nkj->nij", J, J))
         b = _sums(landmarks, np.einsum("nki,nk->ni", J, r))
-        N += FLOOR * np.eye(3)  # what nothing sees stays where it is
+        N += FLOOR * np.eye(3)  # a point without observations stays
         points = points + np.linalg.solve(N, b[..., None])[..., 0]
     return points
 
 
 def _sums(groups: Indices, values: Floats) -> Floats:
-    """The sum of the values (n, ...) of each group."""
+    """Returns the sum of the values (n, ...) of each group."""
     out = np.zeros((int(groups.max()) + 1, *values.shape[1:]))
     np.add.at(out, groups, values)
     return out

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Frames that repeat the one before: a driver that sends its last picture again under a new time.
+"""Leaves out frames that repeat the one before, when a driver resends a picture with a new time.
 
-Such a frame says that the body stood for a moment. It is left out and counted. A camera that stands
-may show the same picture for long, where it has no noise (rendered ones): frames that repeat behind
-the first repeated one are kept while twists or gyro tell no motion (`moves`).
+Such a frame would show that the body stood for a moment. It is left out and counted. A camera that
+stands may show the same picture for long, if it has no noise (rendered ones): frames that repeat
+after the first repeated one are kept while twists or gyro show no motion (`moves`).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Flags = NDArray[np.bool_]
 SUBJECT = "repeated frames"
 POINTS_LEAST = 3
 FITS_D2, LIKE = 25.0, 0.7  # of three degrees of freedom; of the share elsewhere
-MANY = 0.02  # of the frames: told as a fault of the camera or the recorder
+MANY = 0.02  # share of the frames from which camera or recorder is reported as faulty
 MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
 
 
 class Repeats:
-    """Goes along with the pictures, pair by pair, and says which are left out."""
+    """Follows the pictures pair by pair, and decides which are left out."""
 
     def __init__(self, moves: Flags, t_ns: Times) -> None:
         self._t_ns = t_ns
@@ -40,7 +40,7 @@ class Repeats:
         self._seen = 0
 
     def leaves_out(self, left: NDArray[Any], right: NDArray[Any]) -> bool:
-        """Whether this pair, the next one, repeats the left or the right picture before."""
+        """Returns whether this next pair repeats the left or the right picture before."""
         k, before = self._seen, self._before
         self._seen, self._before = k + 1, (left, right)
         same = before is not None and (
@@ -54,7 +54,7 @@ class Repeats:
 
     @property
     def kept_t_ns(self) -> Times:
-        """Times of the pairs that are taken."""
+        """Returns the times of the pairs that are kept."""
         return self._t_ns[self._kept]
 
     @property
@@ -65,9 +65,10 @@ class Repeats:
 def left_out(
     moves: Flags, t_ns: Times, tracks: Tracks, camera: Camera
 ) -> tuple[Times, Tracks, list[Finding]]:
-    """Times and tracks without the frames all of whose tracks, and no other ones, stand bit for bit
-    where they stood before; if behind them the tracks follow the same points as before, and not
-    others (faults.stale).
+    """Returns times and tracks without repeated frames, and what was found.
+
+    In a repeated frame the same tracks stand bit for bit where they stood before. It is left out if
+    the tracks follow the same points afterwards; else it is stale (faults.stale).
     """
     count = tracks.frame_count
     pairs = tracks.pairs(1)
@@ -89,7 +90,7 @@ def left_out(
 
 
 def _go_on(tracks: Tracks, camera: Camera, repeats: NDArray[np.intp]) -> bool:
-    """Whether the points before and behind the repeated frames are one rigid scene as elsewhere."""
+    """Returns whether points before and after the repeated frames are one rigid scene."""
     views = two_views(tracks, camera, 2)
     across = np.isin(tracks.frame[views.first], repeats - 1)
     if across.sum() < POINTS_LEAST or across.all():
@@ -105,8 +106,9 @@ def _findings(left: int, of: int) -> list[Finding]:
 
 
 def moves(t_ns: Times, own_ns: Times, turns: Floats, speeds: Floats | None) -> Flags:
-    """Whether the body moves from the frame before to each: by the rates of turn of its gyro or its
-    twists, and by their velocities.
+    """Returns whether the body moves from the previous frame to each.
+
+    It moves by the rates of turn of gyro or twists, or by the twists' velocities.
     """
     out = np.linalg.norm(_by_frames(own_ns, turns, t_ns), axis=1) > TURNS_RAD
     if speeds is not None:
@@ -115,7 +117,7 @@ def moves(t_ns: Times, own_ns: Times, turns: Floats, speeds: Floats | None) -> F
 
 
 def _by_frames(own_ns: Times, rates: Floats, t_ns: Times) -> Floats:
-    """(k, 3) what rates add up to from the frame before to each one."""
+    """Returns (k, 3) the rates' integral from the previous frame to each one."""
     seconds = (own_ns - own_ns[0]) * 1e-9
     steps = np.diff(seconds)[:, None]
     summed = np.concatenate((np.zeros((1, 3)), np.cumsum(rates[:-1] * steps, axis=0)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bags of ROS 1 and ROS 2: pictures or tracks, and twists, an IMU or the speeds of wheels."""
+"""Reads bags of ROS 1 and ROS 2: pictures or tracks, and twists, an IMU or wheel speeds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pelorus import se3
 from pelorus.converters import ros_frames, ros_motion, ros_positions, ros_wheels
 from pelorus.converters.bag import Bag
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
-from pelorus.converters.ros_motion import IMU, Moving
+from pelorus.converters.ros_motion import IMU, MotionTopics
 from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Readings, Streams, Twists
 from pelorus.converters.transforms import TF, Chain, Tree, bare
@@ -23,17 +23,17 @@ WRAPPED = "its clock of 32 bits of us starts again at 0: unwrapped"
 
 @dataclass(frozen=True)
 class Topics:
-    """Those that the user names; the others are taken where there is but one."""
+    """The topics that the user names; the others are taken where there is only one."""
 
     cameras: Cameras
-    moving: Moving = field(default_factory=Moving)
+    moving: MotionTopics = field(default_factory=MotionTopics)
     position: str = ""  # of a GNSS receiver
     position_sigma_m: float = 0.0  # 0: as its messages say
     wheels: Beside | None = None  # of an IMU's recording
 
 
 def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
-    """What of the bag becomes a recording; its pictures are read later, so it must stay open."""
+    """Reads what becomes a recording; pictures are read later, so the bag must stay open."""
     remarks: list[str] = []
     tree = Tree(bag)
     motion = asked.motion or ros_motion.read(bag, topics.moving, asked, tree, remarks)
@@ -68,12 +68,16 @@ def _calibrated(
     tree: Tree,
     remarks: list[str],
 ) -> tuple[Calibrated, Cameras]:
-    """Of the files, else of the bag's camera_info; on the body as the files or /tf_static say."""
+    """Returns calibration and cameras by the files, else by the bag's camera_info.
+
+    Their place on the body is by the files or /tf_static.
+    """
     name = resolved(bag.path).stem
     if rig_files.is_own(asked.calibration):
         found = rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens)
         return found, ros_frames.chosen(bag, topics.cameras)
-    of_imu = rig_files.are_of_imu(asked.calibration)  # the bag's camera_info tells the cameras
+    # the cameras are those of the bag's camera_info
+    of_imu = rig_files.are_of_imu(asked.calibration)
     if asked.calibration and not of_imu:
         named = asked.cameras or _named(bag, topics.cameras, rig_files.topics(asked.calibration))
         rig = rig_files.read_rig(asked.calibration, asked.lens, named)
@@ -93,7 +97,10 @@ def _calibrated(
 
 
 def _named(bag: Bag, cameras: Cameras, known: set[str]) -> tuple[str, ...]:
-    """Of a calibration's topics the user's two, or the two that the bag has; none otherwise."""
+    """Returns the user's two topics if the calibration has them, else its two that the bag has.
+
+    Empty otherwise.
+    """
     given = (cameras.left, cameras.right)
     if known.issuperset(given):
         return given
@@ -130,8 +137,9 @@ def _on_body(
     tree: Tree,
     remarks: list[str],
 ) -> Rig:
-    """Where the rig does not say where it sits, as /tf_static does; and where it says it of an IMU
-    that is not what moves the body, by way of the IMU.
+    """Returns the rig with its place on the body, by /tf_static where the rig has none.
+
+    Where the rig has it for an IMU that does not move the body, it is chained by the IMU's frame.
     """
     if rig.T_LB is not None:
         chain = _by_way_of_imu(bag, body, tree) if by_twists else None
@@ -166,7 +174,7 @@ def _on_body(
 
 
 def _by_way_of_imu(bag: Bag, body: str, tree: Tree) -> Chain | None:
-    """From the frame of the twists to the bag's IMU, if both are known and the IMU is but one."""
+    """Returns the chain from the twists' frame to the bag's only IMU, if both are known."""
     frames = {ros_frames.camera_frame(bag, topic) for topic in bag.of_type(IMU)} - {""}
     if len(frames) != 1 or not tree.knows(body, *frames):
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a bag's cameras saw: stereo pictures, or features that somebody tracked already.
+"""Reads what a bag's cameras saw: stereo pictures, or features that were tracked already.
 
 Tracks are sensor_msgs/PointCloud2 or PointCloud with the fields (or channels) id, uL, vL, uR, vR,
 px, or messages with a list `features` of id, u0, v0, u1, v1 (msckf_vio): rays x/z and y/z.
@@ -19,7 +19,7 @@ from pelorus import motion
 from pelorus.console import progress
 from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.order import Stamps, in_order, leave_out, sound
-from pelorus.converters.streams import Pictures, Seen
+from pelorus.converters.streams import Pictures, RawTracks
 from pelorus.converters.transforms import bare
 from pelorus.errors import PelorusError
 from pelorus.extras import cv2
@@ -39,7 +39,7 @@ CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 CLOUD2, CLOUD = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud"
 FIELDS = ("id", "uL", "vL", "uR", "vR")
 RAYS = ("id", "u0", "v0", "u1", "v1")
-TO_GRAY = {  # names of OpenCV
+TO_GRAY = {  # OpenCV's names
     "rgb8": "COLOR_RGB2GRAY",
     "bgr8": "COLOR_BGR2GRAY",
     "8UC3": "COLOR_BGR2GRAY",
@@ -59,15 +59,15 @@ CHANNELS |= dict.fromkeys(("yuv422", "uyvy", "yuv422_yuy2", "yuyv"), 2)
 PLAIN, DEEP = ("mono8", "8UC1"), ("mono16", "16UC1")
 SIDES = (("left", "right"), ("infra1", "infra2"), ("fisheye1", "fisheye2"))  # and RealSense
 NUMBERED = (("cam0", "cam1"), ("camera0", "camera1"), ("cam_0", "cam_1"), ("camera_0", "camera_1"))
-TOGETHER_MS = 3.0  # a pair within so much is as good as of one moment at a robot's speeds
+TOGETHER_MS = 3.0  # a pair within this time counts as simultaneous at a robot's speeds
 WAITING_MAX = 200  # pictures of one side that wait for the other
-# The numbers of PointCloud2's types.
+# numpy's types for those of PointCloud2.
 TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
 @dataclass(frozen=True)
 class Cameras:
-    """Topics of pictures, or of tracks; pictures of a pair may be so far apart in time."""
+    """The topics of pictures, or of tracks, and the largest time between the pictures of a pair."""
 
     left: str = ""
     right: str = ""
@@ -75,17 +75,18 @@ class Cameras:
     apart_ns: int = images.APART_NS
     left_info: str = ""
     right_info: str = ""
-    frame: str = ""  # of the left one, in place of what its messages say
+    frame: str = ""  # of the left one, instead of what its messages say
 
 
 def pictures(bag: Bag) -> list[str]:
-    """The topics that hold some."""
+    """Returns the topics with pictures."""
     return bag.of_type(IMAGE, COMPRESSED)
 
 
 def chosen(bag: Bag, cameras: Cameras, rig: Rig | None = None) -> Cameras:
-    """The user's topics; else the calibration's; else the one pair that is called left and right,
-    or 0 and 1: 0 is the calibration's first camera.
+    """Returns the user's topics, else the calibration's, else the only pair of left and right.
+
+    A pair may also be called 0 and 1, where 0 is the calibration's first camera.
     """
     if cameras.tracks:
         return cameras
@@ -114,8 +115,9 @@ def chosen(bag: Bag, cameras: Cameras, rig: Rig | None = None) -> Cameras:
 
 
 def _partners(topics: list[str], words: tuple[tuple[str, str], ...]) -> list[tuple[str, str]]:
-    """Those whose names differ in a camera's word alone. What image_transport packs of a topic
-    that is there itself (/compressed) is no picture of its own.
+    """Returns the pairs of topics whose names differ only in a camera's word.
+
+    A packed copy of another topic by image_transport (/compressed) is not a picture of its own.
     """
     there = {t.lower(): t for t in topics if t.rsplit("/", 1)[0] not in topics}
     found = {
@@ -127,8 +129,10 @@ def _partners(topics: list[str], words: tuple[tuple[str, str], ...]) -> list[tup
     return sorted(found)
 
 
-def read(bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]) -> Pictures | Seen:
-    """Pictures, or tracks."""
+def read(
+    bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]
+) -> Pictures | RawTracks:
+    """Reads pictures, or tracks."""
     if cameras.tracks:
         return _tracks(bag, cameras.tracks, calibrated, remarks)
     return _pictures(bag, cameras, remarks)
@@ -138,10 +142,10 @@ def read(bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str])
 
 
 def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
-    """Pairs by the times of their headers: of each left picture the nearest right one."""
+    """Returns pairs by the times of their headers: each left picture with the nearest right one."""
     topics = [cameras.left, cameras.right]
     stamps: dict[str, list[tuple[int, int]]] = {topic: [] for topic in topics}
-    brightest: int | None = None  # of those of 16 bits
+    brightest: int | None = None  # of 16-bit pictures
     for found in progress(bag.written(topics), "finding pictures", bag.count(topics)):
         stamps[found.topic].append((found.t_ns, found.arrival_ns))
         deep = _of_16_bits(bag, found.topic, found.message, len(stamps[found.topic]))
@@ -163,7 +167,7 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
 
 
 def _times(bag: Bag, topic: str, stamps: list[tuple[int, int]], remarks: list[str]) -> Times:
-    """Of the pictures that have one, in order."""
+    """Returns the times of the pictures that have one, in order."""
     t_ns: Times = np.array([t for t, _ in stamps], np.int64)
     return t_ns[_chosen(bag, topic, stamps, remarks)]
 
@@ -171,7 +175,7 @@ def _times(bag: Bag, topic: str, stamps: list[tuple[int, int]], remarks: list[st
 def _chosen(
     bag: Bag, topic: str, stamps: list[tuple[int, int]], remarks: list[str]
 ) -> NDArray[np.intp]:
-    """Which messages have a time, in the order of it, by their stamps and arrivals."""
+    """Returns the messages that have a time, in its order, by stamps and arrivals."""
     require_messages(bag, topic, len(stamps))
     t_ns, arrival_ns = np.array(stamps, np.int64).T
     good = np.nonzero(sound(bag, topic, t_ns, np.zeros((len(t_ns), 0)), remarks))[0]
@@ -179,8 +183,9 @@ def _chosen(
 
 
 def _of_16_bits(bag: Bag, topic: str, message: Any, count: int) -> NDArray[Any] | None:
-    """Its pixels if it is such a picture; of packed ones the first, second, fourth, ... alone, for
-    it takes time.
+    """Returns the pixels of a 16-bit picture; None for others.
+
+    Of packed ones only the first, second, fourth, ... are unpacked, for it takes time.
     """
     where = bag.path / topic.lstrip("/")
     if getattr(message, "encoding", "") in DEEP:
@@ -192,7 +197,7 @@ def _of_16_bits(bag: Bag, topic: str, message: Any, count: int) -> NDArray[Any] 
 
 
 def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
-    """(n, 2) times: two pictures of which each is the nearest to the other."""
+    """Returns (n, 2) times: two pictures of which each is the nearest to the other."""
     pairs = images.together(left, right, cameras.apart_ns)
     alone = len(left) + len(right) - 2 * len(pairs)
     if images.too_many_alone(len(pairs), alone) or len(pairs) < images.PAIRS_MIN:
@@ -207,7 +212,7 @@ def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
 
 
 def apart_words(pairs: Times) -> list[str]:
-    """What is to be said of pairs whose stamps are so far apart that it matters in a turn."""
+    """Returns a remark on pairs whose stamps differ by more than matters in a turn."""
     apart_ns = pairs[:, 1] - pairs[:, 0]
     usual_ms = float(np.median(np.abs(apart_ns))) * 1e-6
     if usual_ms <= TOGETHER_MS:
@@ -222,11 +227,11 @@ def apart_words(pairs: Times) -> list[str]:
 
 
 def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[tuple[Gray, Gray]]:
-    """One pass through the bag; what comes early waits for its partner."""
+    """Yields the pairs in one pass through the bag; an early picture waits for its partner."""
     wanted = {cameras.left: set(pairs[:, 0].tolist()), cameras.right: set(pairs[:, 1].tolist())}
     waiting: dict[str, dict[int, Gray]] = {cameras.left: {}, cameras.right: {}}
-    due = iter(pairs.tolist())
-    first, second = next(due)
+    expected = iter(pairs.tolist())
+    first, second = next(expected)
     for topic, t_ns, message, _ in bag.messages([cameras.left, cameras.right]):
         if t_ns not in wanted[topic] or t_ns in waiting[topic]:
             continue
@@ -238,14 +243,14 @@ def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[t
             yield pair
             wanted[cameras.left].discard(first)
             wanted[cameras.right].discard(second)
-            following = next(due, None)
+            following = next(expected, None)
             if following is None:
                 return
             first, second = following
 
 
 def gray(where: Path, message: Any, bits: int = 16) -> Gray:
-    """(rows, columns) of 8 bits; of a picture of 16 bits the upper eight of those that are used."""
+    """Returns (rows, columns) of 8 bits; of a 16-bit picture the upper eight of the used bits."""
     if hasattr(message, "format"):
         return images.decoded(where, bytes(message.data), bits)
     encoding = message.encoding
@@ -253,7 +258,7 @@ def gray(where: Path, message: Any, bits: int = 16) -> Gray:
     if encoding not in (*PLAIN, *DEEP, *TO_GRAY):
         known = ", ".join((*PLAIN, *DEEP, *TO_GRAY))
         raise ForeignFileError(
-            where, f"pictures are encoded as {encoding}", due=f"{known} are expected"
+            where, f"pictures are encoded as {encoding}", expected=f"{known} are expected"
         )
     if encoding in DEEP:
         return np.asarray(_deep(where, message) >> (bits - 8), np.uint8)
@@ -265,7 +270,7 @@ def gray(where: Path, message: Any, bits: int = 16) -> Gray:
 
 
 def _lines(where: Path, message: Any, pixel_bytes: int) -> NDArray[np.uint8]:
-    """(rows, bytes of a row), without what pads it."""
+    """Returns (rows, bytes of a row), without padding."""
     rows, columns, step = int(message.height), int(message.width), int(message.step)
     packed = np.asarray(message.data, np.uint8)
     if len(packed) < rows * step or step < columns * pixel_bytes:
@@ -285,7 +290,7 @@ def _deep(where: Path, message: Any) -> NDArray[np.uint16]:
 # --- tracks ---------------------------------------------------------------------------------------
 
 
-def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) -> Seen:
+def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) -> RawTracks:
     if topic not in bag.types:
         raise PelorusError(f"{bag.path}: has no topic {topic}; {bag.listing()}")
     where = bag.path / topic.lstrip("/")
@@ -305,11 +310,11 @@ def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) ->
     tracks.check(bag.path)
     if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
         raise ForeignFileError(bag.path, "an id stands twice in a message", at=topic)
-    return Seen(where, times, tracks)
+    return RawTracks(where, times, tracks)
 
 
 def observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
-    """(n, 5): id, uL, vL, uR, vR in px."""
+    """Returns (n, 5): id, uL, vL, uR, vR in px."""
     if hasattr(message, "features"):
         found = [[float(getattr(f, name)) for name in RAYS] for f in message.features]
         rows = np.array(found).reshape(-1, len(RAYS))
@@ -327,7 +332,7 @@ def observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
         raise ForeignFileError(
             where,
             f"holds no tracks: lacks {', '.join(lacking)}",
-            due=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is expected, or features of "
+            expected=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is expected, or features of "
             f"{', '.join(RAYS)}; there are: {', '.join(columns) or 'none of them'}",
         )
     return np.stack([columns[name] for name in FIELDS], axis=-1)
@@ -364,13 +369,13 @@ def _lenses(calibrated: Calibrated) -> tuple[Lens, Lens]:
 
 
 def camera_frame(bag: Bag, topic: str) -> str:
-    """What the messages of a topic call the frame of their sensor."""
+    """Returns the frame in the messages of a topic."""
     first = next(bag.messages([topic], whole=True), None)
     return "" if first is None else bare(first.message.header.frame_id)
 
 
 def camera_infos(bag: Bag, cameras: Cameras) -> Infos | None:
-    """The first camera_info of each picture topic; None where there are not two."""
+    """Returns the first camera_info of each picture topic; None where there are not two."""
     named = (cameras.left, cameras.left_info), (cameras.right, cameras.right_info)
     beside = [
         bag.require(info, CAMERA_INFO) if info else _info_topic(bag, topic) for topic, info in named
@@ -383,7 +388,7 @@ def camera_infos(bag: Bag, cameras: Cameras) -> Infos | None:
 
 
 def _info_topic(bag: Bag, topic: str) -> str:
-    """/left/camera_info, or another one alone there, for /left/image_raw(/compressed)."""
+    """Returns /left/camera_info, or the only one beside it, for /left/image_raw(/compressed)."""
     parts = topic.split("/")
     for k in range(len(parts) - 1, 0, -1):
         folder = "/".join([*parts[:k], ""])
@@ -397,7 +402,7 @@ def _info_topic(bag: Bag, topic: str) -> str:
 
 def _info(bag: Bag, topic: str) -> Info:
     info = next(bag.messages([topic], whole=True)).message
-    # ROS 1 has capital letters, ROS 2 small ones
+    # ROS 1 uses capital letters, ROS 2 small ones
     K, D, R, P = (
         np.array(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
         for name in "kdrp"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What moves the body in a bag: twists of odometry or wheels, a gyro beside them, or an IMU."""
+"""Reads what moves the body in a bag: twists of odometry or wheels, also with a gyro, or an IMU."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from pelorus.motion import Times
 from pelorus.se3 import Poses
 from pelorus.trajectory import QUATERNION_NORM_TOLERANCE, Trajectory
 
-# What gives twists, and how.
+# Message types with twists, and how to read these.
 TWISTS: dict[str, Callable[[Any], Any]] = {
     "nav_msgs/msg/Odometry": lambda m: m.twist.twist,
     "geometry_msgs/msg/TwistStamped": lambda m: m.twist,
     "geometry_msgs/msg/TwistWithCovarianceStamped": lambda m: m.twist.twist,
 }
 IMU = "sensor_msgs/msg/Imu"
-VECTOR = "geometry_msgs/msg/Vector3Stamped"  # of a driver that parts gyro and accelerometer
+VECTOR = "geometry_msgs/msg/Vector3Stamped"  # of a driver with separate gyro and accelerometer
 JOINTS = "sensor_msgs/msg/JointState"
 POSES: dict[str, Callable[[Any], tuple[Any, Any]]] = {
     "nav_msgs/msg/Odometry": lambda m: (m.pose.pose.position, m.pose.pose.orientation),
@@ -49,7 +49,7 @@ AXES = [f"{kind}{axis}" for kind in "vw" for axis in "xyz"]
 
 @dataclass(frozen=True)
 class Wheels:
-    """Joints that turn at rad/s; with a track width the last one less the first one is a turn."""
+    """Joints that turn at rad/s; with a track width the last minus the first gives the turn."""
 
     topic: str
     joints: tuple[str, ...]
@@ -58,20 +58,20 @@ class Wheels:
 
 
 @dataclass(frozen=True)
-class Moving:
-    """Topics that the user names; else the only ones."""
+class MotionTopics:
+    """The topics that the user names; others are taken where there is only one."""
 
     twist: str = ""
     gyro: str = ""
     imu: str = ""
     wheels: Wheels | None = None
-    frame: str = ""  # of the body, in place of what the messages say
-    truth: str = ""  # moves nothing, unless it is named twice
-    by_imu: bool = False  # twists and wheels are beside it
+    frame: str = ""  # of the body, instead of what the messages say
+    truth: str = ""  # not used as motion, unless it is named twice
+    by_imu: bool = False  # twists and wheels are beside an IMU
 
 
 class Rows(NamedTuple):
-    """Numbers of a topic in the order of time, and the frame that its messages name."""
+    """Numbers of a topic in the order of time, and the frame in its messages."""
 
     t_ns: Times
     numbers: Floats
@@ -79,9 +79,9 @@ class Rows(NamedTuple):
 
 
 def read(
-    bag: Bag, topics: Moving, asked: Asked, tree: Tree, remarks: list[str]
+    bag: Bag, topics: MotionTopics, asked: Asked, tree: Tree, remarks: list[str]
 ) -> Twists | Readings:
-    """Of the topics that are named, else of those that there are but one of."""
+    """Reads the motion from the named topics, else from the only ones."""
     found = _alone(bag, topics, asked, remarks)
     if topics.frame:
         found = replace(found, frame=bare(topics.frame))
@@ -98,7 +98,7 @@ def read(
 
 
 def _turned(w: Floats, topic: str, frame: str, body: str, tree: Tree, remarks: list[str]) -> Floats:
-    """A gyro's rates in the axes of the body, as far as the transforms know both."""
+    """Returns a gyro's rates in the axes of the body, as far as the transforms know both."""
     if not tree.knows(frame, body):
         remarks.append(f"{topic}: of the frame {frame!r}, taken as having the axes of {body!r}")
         return w
@@ -111,8 +111,8 @@ def _timing(asked: Asked) -> TwistTiming:
     return TwistTiming.START if asked.timing is None else asked.timing
 
 
-def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists | Readings:
-    """Without the gyro beside twists."""
+def _alone(bag: Bag, topics: MotionTopics, asked: Asked, remarks: list[str]) -> Twists | Readings:
+    """Reads the motion without the gyro beside twists."""
     named = [topic for topic in (topics.twist, topics.imu) if topic]
     if len(named) + (topics.wheels is not None) > 1:
         raise PelorusError(
@@ -134,7 +134,7 @@ def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists
         return _twists(bag, bag.require(topics.twist or twists[0], *TWISTS), asked, remarks)
     if not twists and len(imus) == 1:
         return _imu(bag, imus[0], topics.gyro, remarks)
-    pair = _apart(bag, imus, remarks) if not twists and len(imus) == 2 else None
+    pair = _separate_imu_topics(bag, imus, remarks) if not twists and len(imus) == 2 else None
     if pair is not None:
         return pair
     raise PelorusError(
@@ -170,7 +170,7 @@ def _twists(bag: Bag, topic: str, asked: Asked, remarks: list[str]) -> Twists:
 
 
 def of_joints(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
-    """Forward the mean of the wheels' speeds; nothing else, unless the track width gives a turn."""
+    """Returns twists with the mean of the wheels' speeds; a turn only with a track width."""
     topic = bag.require(wheels.topic, JOINTS)
 
     def row(message: Any) -> list[float]:
@@ -180,7 +180,7 @@ def of_joints(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
                 bag.path,
                 f"{topic} has the joints {', '.join(message.name)} with "
                 f"{len(message.velocity)} velocities",
-                due=f"{', '.join(wheels.joints)} with a velocity each are expected",
+                expected=f"{', '.join(wheels.joints)} with a velocity each are expected",
             )
         return [float(message.velocity[message.name.index(name)]) for name in wheels.joints]
 
@@ -200,7 +200,7 @@ def of_joints(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
 
 
 def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
-    """Of one topic; or of two, if the gyro is named, or if each of two has one of the halves."""
+    """Reads an IMU from one topic, or from two if the gyro is named or each holds one half."""
     if gyro == topic:
         raise PelorusError(f"--imu-topic and --gyro-topic: {topic} is named twice")
     if gyro:
@@ -222,13 +222,13 @@ def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
         bag.path,
         f"all its {what} are 0",
         at=topic,
-        due="are they on another topic? --imu-topic of the accelerometer and --gyro-topic of the "
-        f"gyro are expected; {bag.listing()}",
+        expected="are they on another topic? --imu-topic of the accelerometer and --gyro-topic of "
+        f"the gyro are expected; {bag.listing()}",
     )
 
 
-def _apart(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
-    """Of an accelerometer's topic and a gyro's, if these are that."""
+def _separate_imu_topics(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
+    """Joins the topics of an accelerometer and a gyro; None if the topics are not these."""
     pair = [_halves(bag, topic, []) for topic in topics]
     forces = [bool(rows.numbers[:, :3].any()) for rows in pair]
     rates = [bool(rows.numbers[:, 3:].any()) for rows in pair]
@@ -239,7 +239,7 @@ def _apart(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
 
 
 def _joined(bag: Bag, accel: str, gyro: str, a: Rows, w: Rows, remarks: list[str]) -> Readings:
-    """The slower one of the two is interpolated to the times of the faster one."""
+    """Joins both; the slower one is interpolated to the times of the faster one."""
     forces, rates = (a.t_ns, a.numbers[:, :3]), (w.t_ns, w.numbers[:, 3:])
     if not forces[1].any():
         raise ForeignFileError(bag.path, "all its specific forces are 0", at=accel)
@@ -253,7 +253,7 @@ def _joined(bag: Bag, accel: str, gyro: str, a: Rows, w: Rows, remarks: list[str
 
 
 def _halves(bag: Bag, topic: str, remarks: list[str]) -> Rows:
-    """(n, 6) specific force and rate of turn; a lone vector stands in both."""
+    """Returns (n, 6) specific force and rate of turn; a lone vector is in both."""
     bag.require(topic, IMU, VECTOR)
 
     def row(message: Any) -> list[float]:
@@ -273,7 +273,7 @@ def _readings(bag: Bag, topic: str, rows: Rows) -> Readings:
 
 
 def truth(bag: Bag, topic: str, remarks: list[str]) -> Trajectory:
-    """Poses of the body in the world."""
+    """Reads poses of the body in the world."""
     bag.require(topic, *POSES)
     of_message = POSES[bag.types[topic]]
     t_ns, numbers, _ = rows_of(bag, topic, lambda message: _pose(of_message(message)), remarks)
@@ -283,7 +283,7 @@ def truth(bag: Bag, topic: str, remarks: list[str]) -> Trajectory:
 
 
 def _pose(pose: tuple[Any, Any]) -> list[float]:
-    """p and q, x y z w."""
+    """Returns p and q, x y z w."""
     p, q = pose
     return [*xyz(p), *xyz(q), float(q.w)]
 
@@ -301,12 +301,12 @@ def _are_rotations(quaternions: Floats) -> bool:
 
 
 def xyz(vector: Any) -> list[float]:
-    """Three numbers of a message."""
+    """Returns the three numbers of a message's vector."""
     return [float(vector.x), float(vector.y), float(vector.z)]
 
 
 def rows_of(bag: Bag, topic: str, row: Callable[[Any], list[float]], remarks: list[str]) -> Rows:
-    """Of a topic, a row a message, without messages that tell nothing."""
+    """Returns a row for each message of a topic, without those that hold nothing usable."""
     found = progress(bag.written([topic]), f"reading {topic}", bag.count([topic]))
     stamped, frame = [], ""
     for one in found:

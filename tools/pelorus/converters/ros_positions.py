@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fixes of a bag's GNSS receiver as readings of the position sensor."""
+"""Reads the fixes of a bag's GNSS receiver as readings of the position sensor."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ SENSOR = next(sensor for sensor in SMALL_SENSORS if sensor.name == "position")
 def read(
     bag: Bag, topic: str, sigma_m: float, body: str, tree: Tree, remarks: list[str]
 ) -> list[Reading]:
-    """Metres east, north and up of the first fix; `sigma_m` in place of the messages' own, if not
-    0. Where the antenna sits on the body, the transforms say.
+    """Returns positions in metres east, north and up of the first fix.
+
+    `sigma_m` replaces the messages' own, if not 0. The antenna's place on the body is by the
+    transforms.
     """
     bag.require(topic, FIX)
 
@@ -50,7 +52,7 @@ def read(
             bag.path,
             "messages tell no covariance",
             at=topic,
-            due="--position-sigma M is expected",
+            expected="--position-sigma M is expected",
         )
     local = Ground().local(bag.path / topic.lstrip("/"), places, remarks)
     arm_m = _arm(topic, frame, body, tree, remarks)

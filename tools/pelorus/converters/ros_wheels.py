@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A bag's wheels beside its IMU: odometry, twists or the speeds of joints as readings of the small
-sensor `wheel`.
+"""Reads a bag's wheels beside its IMU as readings of the small sensor `wheel`.
+
+They are odometry, twists or the speeds of joints.
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ from pelorus.frames import Reading
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
 
-SIGMA_MAX_MPS = 10.0  # beyond it a covariance says "not measured"
+SIGMA_MAX_MPS = 10.0  # a larger one means "not measured"
 
 
 @dataclass(frozen=True)
 class Beside:
-    """Which wheels: a topic of twists, or joints. With a track width two of them are told apart."""
+    """The wheels: a topic of twists, or joints. With a track width left and right are separate."""
 
     topic: str = ""
     joints: Wheels | None = None
     sigma_mps: float = 0.0  # 0: as the messages say
-    letters: str = "x"  # of the axes that they measure
+    letters: str = "x"  # axes that they measure
     track_m: float = 0.0
     stand: bool = True  # where they read 0, the body stands
-    slide_mps: float = 0.0  # they slide and rise no more than that, as a sigma; 0: nobody says
+    slide_mps: float = 0.0  # sigma along axes that they do not measure; 0: unknown
 
     def check(self) -> None:
-        """PelorusError where it makes no sense."""
+        """Raises PelorusError where the options contradict each other."""
         if not self.letters or set(self.letters) - set(WHEEL.letters):
             raise PelorusError(
                 f"--wheel-axes is {self.letters}: some of the letters {WHEEL.letters} are expected"
@@ -51,7 +52,7 @@ class Beside:
 
 
 def read(bag: Bag, beside: Beside, body: str, tree: Tree, remarks: list[str]) -> list[Reading]:
-    """Returns their readings; where they sit on the body, the transforms say."""
+    """Returns the readings; the wheels' place on the body is by the transforms."""
     beside.check()
     if beside.joints is None:
         rolling, turn_radps, frame = _of_topic(bag, beside, remarks)
@@ -76,7 +77,7 @@ def read(bag: Bag, beside: Beside, body: str, tree: Tree, remarks: list[str]) ->
 
 
 def _of_topic(bag: Bag, beside: Beside, remarks: list[str]) -> tuple[Rolling, Floats, str]:
-    """Of odometry or twists, with the yaw rates and the frame that the messages name."""
+    """Reads odometry or twists; also returns the yaw rates and the frame in the messages."""
     topic = bag.require(beside.topic, *TWISTS)
     of_twist = TWISTS[bag.types[topic]]
 
@@ -97,14 +98,14 @@ def _of_topic(bag: Bag, beside: Beside, remarks: list[str]) -> tuple[Rolling, Fl
 
 def _sigma_wanted(bag: Bag, topic: str, beside: Beside) -> float:
     if not beside.sigma_mps:
-        due = "--wheel-sigma M/S is expected: how far a speed is off, slip apart; 0.05 for "
+        expected = "--wheel-sigma M/S is expected: how far a speed is off, slip apart; 0.05 for "
         "many wheels"
-        raise ForeignFileError(bag.path, "messages tell no covariance", at=topic, due=due)
+        raise ForeignFileError(bag.path, "messages tell no covariance", at=topic, expected=expected)
     return beside.sigma_mps
 
 
 def _seat(topic: str, frame: str, body: str, tree: Tree, remarks: list[str]) -> Poses:
-    """The wheels' frame in the body's, which is the IMU's."""
+    """Returns the pose of the wheels' frame in the body's, which is the IMU's."""
     if not tree.knows(frame, body):
         if frame != body:
             remarks.append(

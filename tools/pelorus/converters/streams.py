@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What somebody's own data are, whatever their format: streams with times, and a calibration.
+"""A user's own data in any format: streams with times, and a calibration.
 
 Each importer reads one format into Streams; `recording` makes a recording of them: pictures are
-rectified and tracked, raw tracks rectified, frames brought to the body's clock, the truth to the
+rectified and tracked, raw tracks rectified, frames moved to the body's clock, the truth to the
 frames.
 """
 
@@ -44,14 +44,14 @@ BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
 RESOLUTIONS = 8  # stamps may be rounded to 10 ms, and to each finer power of ten
-PAUSE_STEPS = 5.0  # periods without a reading are a pause, across which nothing is interpolated
-# What no robot turns faster than while its tracks hold, about an axis that nothing measures: the
-# pictures find the rotation. It is one constant from frame to frame, in all readings between them.
+PAUSE_STEPS = 5.0  # a longer gap, in periods, is a pause, across which nothing is interpolated
+# The fastest turn of a robot while its tracks hold, about an axis that nothing measures: the
+# pictures find the rotation. It is constant between two frames, in all readings between them.
 BLIND_TURN_RADPS = 3.0
 
 
 class TwistIn(StrEnum):
-    """The axes in which somebody's twists are given; poses: none, they are made of his poses."""
+    """The axes in which twists are given; with `poses` they are computed from the user's poses."""
 
     AUTO = "auto"
     BODY = "body"
@@ -62,14 +62,14 @@ class TwistIn(StrEnum):
 
 @dataclass(frozen=True)
 class Twists:
-    """Velocities in body axes; zeros where `measured` says that nobody measured them."""
+    """Velocities in body axes; zero where `measured` says that nobody measured them."""
 
     where: Path
     t_ns: Times
     v_B_mps: Floats
     w_B_radps: Floats
     measured: frozenset[str] = frozenset(("vx", "vy", "vz", "wx", "wy", "wz"))
-    frame: str = ""  # the body's name, where the source tells it
+    frame: str = ""  # the body's name, where the source has it
 
     @property
     def is_whole(self) -> bool:
@@ -78,7 +78,7 @@ class Twists:
 
 @dataclass(frozen=True)
 class Readings:
-    """Those of an IMU."""
+    """The readings of an IMU."""
 
     where: Path
     inertial: Inertial
@@ -87,7 +87,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a folder or a bag does not say, or says otherwise than its user: in place of its own.
+    """What the user adds to a folder or a bag, or says instead of it.
 
     `calibration`, `extrinsic`, `lens` and `cameras` are as rig.read has them.
     """
@@ -107,7 +107,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Pictures:
-    """Stereo pairs as the left and the right camera took them; `read` gives them in order."""
+    """Stereo pairs as the left and the right camera took them; `read` yields them in order."""
 
     where: tuple[Path, Path]
     t_ns: Times
@@ -115,7 +115,7 @@ class Pictures:
 
 
 @dataclass(frozen=True)
-class Seen:
+class RawTracks:
     """Tracks, in the pixels of the calibration's cameras."""
 
     where: Path
@@ -128,28 +128,29 @@ class Streams:
     """Twists or an IMU, and what the cameras saw."""
 
     calibrated: Calibrated
-    frames: Pictures | Seen
+    frames: Pictures | RawTracks
     motion: Twists | Readings
     truth: Trajectory | None = None
     small: list[Reading] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     on_earth: bool = False  # its positions are east, north and up of a place
-    settings: dict[str, float] = field(default_factory=dict)  # what is known of the filter's
+    # of the filter, as far as they are known
+    settings: dict[str, float] = field(default_factory=dict)
 
     @property
-    def told(self) -> list[str]:
-        """What its user is to be told of how the files were read."""
+    def all_remarks(self) -> list[str]:
+        """Returns what the user should know of how the files were read."""
         of_truth = self.truth.remarks if self.truth else ()
         return [*self.remarks, *of_truth, *self.calibrated.remarks]
 
 
 def recording(streams: Streams, settings: Settings | None = None) -> Recording:
-    """`settings` are those of the tracker."""
+    """Makes a recording; `settings` are those of the tracker."""
     return _made(streams, settings)[0]
 
 
 def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[Finding]]:
-    """The recording, and what was found in making it."""
+    """Returns the recording, and what was found in making it."""
     calibrated, frames = streams.calibrated, streams.frames
     t_ns = frames.t_ns
     if calibrated.rig is not None:
@@ -185,10 +186,11 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
 def converted(
     found: Streams, timing: TwistTiming | None, fix: bool
 ) -> tuple[Recording, list[Finding]]:
-    """The recording; if asked mended as far as its own data tell, and the twists' noise measured.
+    """Returns the recording and the findings; with `fix` it is mended, and the twists' noise
+    measured.
 
     `timing` overrides the calibration's. Without all six velocities only the tracks can be judged.
-    An IMU's drive is judged, not mended.
+    A drive by an IMU is judged, not mended.
     """
     made, placed = _made(found, None)
     if timing is not None:
@@ -213,7 +215,7 @@ def converted(
 
 
 def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
-    remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.told]
+    remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.all_remarks]
     motion = streams.motion
     if isinstance(motion, Twists):
         in_frame = max(_interval_s(t_ns) / _interval_s(motion.t_ns), 1.0)
@@ -228,7 +230,7 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
         moved = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)))
         inertial = model.correction.of(motion.inertial)
         first_ns = int(inertial.t_ns[0])
-    # with its first twist or reading the filter begins
+    # the filter begins with the first twist or reading
     small = [reading for reading in streams.small if reading.t_ns >= first_ns]
     return Recording(
         header,
@@ -243,13 +245,13 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
 
 
 def _require_gravity(readings: Readings) -> None:
-    """An IMU that is at rest for some of the time, or level on average, feels 9.81 m/s^2."""
+    """Refuses an IMU without gravity: at rest, or level on average, it must measure 9.81 m/s^2."""
     usual = float(np.median(np.linalg.norm(readings.inertial.a_B_mps2, axis=1)))
     if not FORCES_MPS2[0] <= usual <= FORCES_MPS2[1]:
         raise ForeignFileError(
             readings.where,
             f"the specific force is {usual:.3g} m/s^2 in the median",
-            due="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
+            expected="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
             "gravity "
             "been taken away? Raw readings are expected",
         )
@@ -260,9 +262,9 @@ def _interval_s(t_ns: Times) -> float:
 
 
 def _with_blind_axes(noise: Noise, measured: frozenset[str], in_frame: float) -> Noise:
-    """Sigmas for what nobody measured, unless the calibration tells some.
+    """Returns the noise with sigmas for what nobody measured, unless the calibration has some.
 
-    Of `in_frame` readings from frame to frame, whose noises average, each has the root of that many
+    The noises of `in_frame` readings between frames average, so each has the root of that many
     times the sigma of the turn.
     """
     turn_radps = BLIND_TURN_RADPS * float(np.sqrt(in_frame))
@@ -277,10 +279,10 @@ def _with_blind_axes(noise: Noise, measured: frozenset[str], in_frame: float) ->
 def with_gyro(
     twists: Twists, where: Path, gyro_t_ns: Times, w_B_radps: Floats, timing: TwistTiming
 ) -> Twists:
-    """The twists with a gyro's rates: each has the mean over the time for which it holds.
+    """Returns the twists with a gyro's rates: each has the mean over the time for which it holds.
 
-    So the rotation between two twists is the gyro's, however fast it is read. Twists that the
-    gyro does not cover are left out.
+    So the rotation between two twists is the gyro's, at any rate of its readings. Twists without
+    gyro readings are left out.
     """
     t = twists.t_ns
     inside = (t >= gyro_t_ns[0]) & (t <= gyro_t_ns[-1])
@@ -313,9 +315,9 @@ def joined(
     rates: tuple[Times, Floats],
     remarks: list[str],
 ) -> Inertial:
-    """Readings of an accelerometer and a gyro with clocks of their own, each as times and numbers.
+    """Joins an accelerometer and a gyro with clocks of their own, each as times and numbers.
 
-    The slower one is interpolated to the times of the faster one; where it pauses, none is made up.
+    The slower one is interpolated to the times of the faster one, but not across its pauses.
     """
     slow, fast = sorted((forces, rates), key=lambda one: len(one[0]))
     (own, x), (t_ns, _) = slow, fast
@@ -343,7 +345,7 @@ def joined(
 
 
 def _held_between(t_ns: Times, timing: TwistTiming) -> Times:
-    """The readings' own times; or, where each is in the middle, those half way between them."""
+    """Returns the times between which readings hold: their own, or half way if centred."""
     if timing is not TwistTiming.MID:
         return t_ns
     half_way = t_ns[:-1] + np.diff(t_ns) // 2
@@ -355,17 +357,17 @@ def _times_of(motion: Twists | Readings) -> Times:
 
 
 def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
-    """Whether the body moves from the frame before to each; by an IMU, whether it turns."""
+    """Returns whether the body moves from frame to frame; by an IMU, whether it turns."""
     if isinstance(motion, Twists):
         return repeated.moves(t_ns, motion.t_ns, motion.w_B_radps, motion.v_B_mps)
     w = motion.inertial.w_B_radps
     return repeated.moves(t_ns, motion.inertial.t_ns, w - np.median(w, axis=0), None)
 
 
-def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Readings) -> None:
+def _require_overlap(frames: Pictures | RawTracks, t_ns: Times, motion: Twists | Readings) -> None:
     own = _times_of(motion)
     if t_ns[-1] < own[0] or own[-1] < t_ns[0]:
-        where = frames.where if isinstance(frames, Seen) else frames.where[0]
+        where = frames.where if isinstance(frames, RawTracks) else frames.where[0]
         raise ForeignFileError(
             where,
             f"spans {t_ns[0]} to {t_ns[-1]} ns, {motion.where} {own[0]} to {own[-1]} ns: "
@@ -377,7 +379,7 @@ def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Read
 
 
 def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
-    """Of a calibration for several resolutions the smallest one that holds all pixels."""
+    """Returns the rig at the smallest of its resolutions that holds all pixels."""
     if not rig.others or not len(tracks):
         return rig
     most = tracks.pixels.max(axis=0).reshape(2, 2).max(axis=0)
@@ -386,7 +388,7 @@ def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
         raise ForeignFileError(
             rig.path,
             f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
-            due="the calibration of these pictures is needed",
+            expected="the calibration of these pictures is needed",
         )
     return rig.of_size(*min(holding, key=np.prod))
 
@@ -395,19 +397,22 @@ def _require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> N
     words = resolution.beyond(tracks.pixels, size)
     if words:
         raise ForeignFileError(
-            where, words, due="the calibration of these pictures, or pixels of those, are expected"
+            where,
+            words,
+            expected="the calibration of these pictures, or pixels of those, are expected",
         )
 
 
 def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tracks:
-    """Of the pixels that the cameras took; without those that no ray of the lens reaches."""
+    """Rectifies the cameras' pixels; leaves out those that no ray of the lens reaches."""
     pixels = rectification.pixels(tracks.pixels)
     good = np.isfinite(pixels).all(axis=1)
     if not good.any():
         raise ForeignFileError(
             source,
             "no pixel is one of the calibration's lenses",
-            due="pixels as the cameras took them are expected, of the calibration's resolution",
+            expected="pixels as the cameras took them are expected, of the calibration's "
+            "resolution",
         )
     return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
 
@@ -415,7 +420,7 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
 def _tracked(
     pictures: Pictures, calibrated: Calibrated, settings: Settings, repeats: repeated.Repeats
 ) -> tuple[Header, Tracks]:
-    """The HEADER of the rectified pictures, and the tracks in them."""
+    """Returns the HEADER of the rectified pictures, and the tracks in them."""
     pairs = pictures.read()
     first = next(pairs)
     height, width = first[0].shape
@@ -447,10 +452,11 @@ def _tracked(
 
 
 def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -> Trajectory:
-    """The truth while the sensors run, and between its poses one at each frame without one: there
-    it is compared; and one where the motion begins, from which a filter starts.
+    """Returns the truth while the sensors run, with a pose at each frame and where the motion
+    begins.
 
-    What a motion capture saw before or behind the sensors is not of the drive.
+    The filter is compared at the frames, and starts from the first pose. What a motion capture saw
+    before or after the sensors ran is not of the drive.
     """
     t_ns, own = truth.t_ns, _times_of(motion)
     if frame_t_ns[-1] < t_ns[0] or t_ns[-1] < frame_t_ns[0]:
@@ -459,7 +465,7 @@ def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) 
             f"{frame_t_ns[-1]} ns: they do not overlap; times on the twists' clock are expected"
         )
     if own[0] < t_ns[0] <= own[0] + _resolution_ns(t_ns):
-        t_ns = np.concatenate((own[:1], t_ns[1:]))  # it was rounded
+        t_ns = np.concatenate((own[:1], t_ns[1:]))  # rounded by the interpolation
     whole = filled(truth._replace(t_ns=t_ns), np.union1d(frame_t_ns, own[:1]))
     first, last = own[0], max(own[-1], frame_t_ns[-1])
     inside = (whole.t_ns >= first) & (whole.t_ns <= last)
@@ -467,13 +473,15 @@ def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) 
 
 
 def _resolution_ns(t_ns: Times) -> int:
-    """To what the stamps were rounded: the largest power of ten that divides all of them."""
+    """Returns the rounding of the stamps: the largest power of ten that divides all of them."""
     return max(int(10**k) for k in range(RESOLUTIONS) if not (t_ns % 10**k).any())
 
 
 def _from_truth(readings: Inertial, truth: Trajectory | None, frame_t_ns: Times) -> Inertial:
-    """Without the readings before a truth that begins between the first one and the first frame:
-    the filter starts from its pose.
+    """Returns the readings from the beginning of the truth on, if it is between first reading and
+    frame.
+
+    The filter then starts from its pose.
     """
     if truth is None or not readings.t_ns[0] < truth.t_ns[0] <= frame_t_ns[0]:
         return readings

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the frames of a robot stand, by a bag's /tf_static and by the links of /tf that never move.
+"""The poses of a robot's frames, by a bag's /tf_static and by the links of /tf that never move.
 
 A transform is the pose of its child in its parent: p_parent = R p_child + t. Each child has one
 parent, so two frames are joined by one chain or by none.
@@ -20,20 +20,20 @@ from pelorus.se3 import IDENTITY, Poses
 
 TF = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 STATIC = "tf_static"
-SAME = 1e-4  # m and rad: two messages of one mounting
+SAME = 1e-4  # m and rad: difference of two messages on one mounting
 FRAMES_SHOWN = 20
-OPTICAL = "optical"  # of a frame whose z looks forward (REP 103)
+OPTICAL = "optical"  # in the name of a frame whose z looks forward (REP 103)
 
 
-class Link(NamedTuple):
-    """To the parent of a frame."""
+class FrameLink(NamedTuple):
+    """A link to the parent of a frame."""
 
     parent: str
     T: Poses
 
 
 class Chain(NamedTuple):
-    """q = T s brings points of the first frame to the last one."""
+    """A chain of links: q = T s maps points of the first frame to the last one."""
 
     T: Poses
     frames: tuple[str, ...]
@@ -44,19 +44,19 @@ class Chain(NamedTuple):
 
 
 def bare(frame: str) -> str:
-    """tf of ROS 1 knew a slash in front."""
+    """Returns the name without the leading slash of ROS 1's tf."""
     return frame.strip().lstrip("/")
 
 
 class Tree:
-    """The links by child; `moving` and `double` are those of which no chain may be made.
+    """The links by child; no chain may use those in `moving` and `double`.
 
-    /tf is long, and read only where /tf_static does not do.
+    /tf is long, and read only where /tf_static does not suffice.
     """
 
     def __init__(self, bag: Bag) -> None:
         self.bag = bag
-        self.links: dict[str, Link] = {}
+        self.links: dict[str, FrameLink] = {}
         self.moving: dict[str, str] = {}
         self.double: dict[str, set[str]] = {}
         topics = bag.of_type(*TF)
@@ -70,7 +70,7 @@ class Tree:
                 self._add(one, is_static)
 
     def knows(self, *frames: str) -> bool:
-        """Whether all these are there."""
+        """Returns whether all these frames are known."""
         if not self.frames.issuperset(frames) and self._unread:
             unread, self._unread = self._unread, []
             self._read(unread, is_static=False)
@@ -84,7 +84,7 @@ class Tree:
         norm = np.linalg.norm(quaternion)
         if child == parent or not np.isfinite(p).all() or not 0.9 < norm < 1.1:
             return
-        link = Link(parent, Poses(Rotation.from_quat(quaternion).as_matrix(), p))
+        link = FrameLink(parent, Poses(Rotation.from_quat(quaternion).as_matrix(), p))
         known = self.links.setdefault(child, link)
         if known.parent == parent and _same(known.T, link.T):
             return
@@ -94,7 +94,7 @@ class Tree:
             self.moving[child] = parent
 
     def chain(self, first: str, last: str) -> Chain:
-        """From one frame to the other; a sentence says why there is none."""
+        """Returns the chain between two frames; raises with a reason if there is none."""
         up, down = self._ancestors(first), self._ancestors(last)
         if up[-1] != down[-1] and self._unread:
             self.knows("")  # reads the rest
@@ -143,7 +143,7 @@ class Tree:
             )
 
     def optical_of(self, frame: str) -> list[str]:
-        """Frames that only turn this one, as a camera's optical frame does its body's."""
+        """Returns the frames that only turn this one, as a camera's optical frame does."""
         return [
             child
             for child, link in self.links.items()

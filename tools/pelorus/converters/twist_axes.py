@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""In which axes odometry gives its velocities, and how they are brought into the body's.
+"""Finds the axes in which odometry gives its velocities, and turns these into the body's.
 
 nav_msgs/Odometry wants them in the body's axes. Some drivers give those of the world, both or the
 velocity alone, and some fill in the pose and leave the twist at zero. The poses that come with them
-tell which it is.
+decide.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from pelorus.frames import TwistTiming
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
 
-CHANCE = 1e-4  # that twists in the body's axes look like those of the world
-RESTS = 1e-6  # m and rad: a pose that never moved
+CHANCE = 1e-4  # probability that twists in the body's axes look like those of the world
+RESTS = 1e-6  # m and rad: largest change of a pose at rest
 
 
 def in_body(
     twists: Twists, poses: Poses | None, asked: TwistIn, timing: TwistTiming, remarks: list[str]
 ) -> Twists:
-    """The twists in body axes, by the poses (body to world) of the same times, if there are any."""
+    """Returns the twists in body axes, by poses (body to world) of the same times, if any."""
     if asked is TwistIn.BODY or (asked is TwistIn.AUTO and not (poses and twists.is_whole)):
         return twists
     if poses is None:
         raise ForeignFileError(
             twists.where,
             f"has no orientation, and --twist-in {asked.value} turns by it",
-            due="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
+            expected="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
             "px_m, "
             "py_m, pz_m)",
         )
@@ -43,11 +43,11 @@ def in_body(
         raise PelorusError(f"--twist-in {asked.value}: all six velocities are expected")
     has_place = bool(np.isfinite(poses.p).all())
     if asked is TwistIn.AUTO:
-        asked = _told(twists, poses, remarks) if has_place else TwistIn.BODY
+        asked = _axes_by_poses(twists, poses, remarks) if has_place else TwistIn.BODY
     if asked is TwistIn.POSES:
         if not has_place:
             raise ForeignFileError(
-                twists.where, "has no places", due="px_m, py_m, pz_m are expected"
+                twists.where, "has no places", expected="px_m, py_m, pz_m are expected"
             )
         return _of_poses(twists, poses, timing)
     v, w = twists.v_B_mps, twists.w_B_radps
@@ -62,8 +62,8 @@ def _into_body(poses: Poses, x_W: Floats) -> Floats:
     return np.asarray(np.einsum("nji,nj->ni", poses.R, x_W))
 
 
-def _told(twists: Twists, poses: Poses, remarks: list[str]) -> TwistIn:
-    """What the poses say of them; and the remark that says it."""
+def _axes_by_poses(twists: Twists, poses: Poses, remarks: list[str]) -> TwistIn:
+    """Returns the axes by the poses, and adds a remark on them."""
     v, w = twists.v_B_mps, twists.w_B_radps
     where = str(twists.where)
     if not v.any() and not w.any():
@@ -94,7 +94,7 @@ def _told(twists: Twists, poses: Poses, remarks: list[str]) -> TwistIn:
 
 
 def _fits_the_world(x: Floats, x_B: Floats, before: Poses, seconds: float) -> bool:
-    """Whether x is what the poses give in world axes, rather than x_B, which is in the body's.
+    """Returns whether x fits the poses in world axes better than x_B, its form in body axes.
 
     Errors of odometry last: those of one second count as one draw of three numbers.
     """
@@ -105,7 +105,7 @@ def _fits_the_world(x: Floats, x_B: Floats, before: Poses, seconds: float) -> bo
 
 
 def _of_poses(twists: Twists, poses: Poses, timing: TwistTiming) -> Twists:
-    """What brings each pose to the next one, at the times at which the timing wants it."""
+    """Returns the twists that move each pose to the next, at the times of the timing."""
     t_ns, rate = twists.t_ns, motion.rates(twists.t_ns, poses)
     if timing is TwistTiming.MID:
         t_ns = t_ns[:-1] + np.diff(t_ns) // 2

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The IMU in a log of PX4 (.ulg), as a table of the project's columns; the library pyulog reads it.
+"""Reads the IMU in a log of PX4 (.ulg) with pyulog, as a table of the project's columns.
 
-sensor_combined are the readings that PX4's estimator takes; where a log lacks them, vehicle_imu has
-angles and velocities summed over an interval, of which the mean rates are taken. Axes are forward,
-right and down, times PX4's own, in us.
+sensor_combined are the readings that PX4's estimator uses; where a log lacks them, vehicle_imu has
+angles and velocities summed over an interval, whose mean rates are taken. Axes are forward, right
+and down; times are PX4's own, in us.
 """
 
 from __future__ import annotations
@@ -26,18 +26,20 @@ AXES = ("x", "y", "z")
 
 
 def is_one(path: Path) -> bool:
-    """By its first bytes."""
+    """Returns whether the file's first bytes are a ULog's."""
     return path.is_file() and foreign.beginning(path).startswith(MAGIC)
 
 
 def table(path: Path, file: str) -> Table:
-    """Columns t_us, ax_mps2, wx_radps and so on; `file` is the option that names it."""
+    """Returns a table with t_us, ax_mps2, wx_radps and so on; `file` is the option's name."""
     if file not in ("imu", "gyro"):
-        raise ForeignFileError(path, "is a log of PX4", due="it is read as --imu or --gyro alone")
+        raise ForeignFileError(
+            path, "is a log of PX4", expected="it is read as --imu or --gyro alone"
+        )
     with extra("pyulog"):
         from pyulog import ULog  # noqa: PLC0415 - an extra
     try:
-        with redirect_stdout(StringIO()):  # it prints what it thinks of a damaged file
+        with redirect_stdout(StringIO()):  # it prints its opinion of damaged files
             log = ULog(str(path), [COMBINED, SUMMED])
     except Exception as error:  # it raises a dozen kinds on damaged files
         words = (str(error).splitlines() or [type(error).__name__])[0]
@@ -57,7 +59,7 @@ def table(path: Path, file: str) -> Table:
 
 
 def _numbers(path: Path, name: str, data: dict[str, Any]) -> dict[str, list[float | int]]:
-    """The columns of one stream."""
+    """Returns the columns of one stream."""
     turned, forced = ("gyro_rad", "accelerometer_m_s2")
     if name == SUMMED:
         turned, forced = "delta_angle", "delta_velocity"

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Wheels beside an IMU, as readings of the small sensor `wheel`; and where they stand, as readings
-of `standstill`.
+"""Makes readings of the small sensor `wheel` from wheels beside an IMU, and of `standstill`.
 
 A velocity v_W in the wheels' frame W is R_BW v_W in the body's. Along an axis of W that nobody
 measures it is 0, with the sigma by which wheels slide.
@@ -24,8 +23,8 @@ WHEEL, STANDSTILL = (
     next(sensor for sensor in SMALL_SENSORS if sensor.name == name)
     for name in ("wheel", "standstill")
 )
-# Encoders that count nothing for so long have moved less than a count, some mm: that is the sigma
-# of a standstill. So much is left out at either end, where the body still settles.
+# Encoders that count nothing for so long have moved less than a count, some mm, which gives the
+# sigma of a standstill. So much is left out at either end, where the body still settles.
 REST_S = 0.5
 REST_EVERY_S = 0.1
 REST_SIGMA = (0.002, 0.005, 0.0)  # m/s, rad/s
@@ -33,7 +32,7 @@ REST_SIGMA = (0.002, 0.005, 0.0)  # m/s, rad/s
 
 @dataclass(frozen=True)
 class Rolling:
-    """Velocities (n, 3) of a point in the wheels' frame, with sigmas; `letters` are measured."""
+    """Velocities (n, 3) of a point in the wheels' frame, with sigmas; `letters`: measured axes."""
 
     t_ns: Times
     v_W_mps: Floats
@@ -44,10 +43,10 @@ class Rolling:
 def readings(
     rolling: Rolling, T_BW: Poses, at_W_m: Floats, slide_mps: float, held: bool = False
 ) -> list[Reading]:
-    """Returns a reading for each time, of the body's axes along which more is measured than not.
+    """Returns a reading for each time, along the body's axes that are more measured than not.
 
     The point sits at `at_W_m` (3,) in W; `slide_mps` is the sigma along an axis of W that nobody
-    measures. With `held` that is believed as a measurement: the readings are of all axes.
+    measures. With `held` that counts as a measurement: the readings are of all axes.
     """
     measured = np.array([letter in rolling.letters for letter in WHEEL.letters])
     square = T_BW.R**2
@@ -62,8 +61,10 @@ def readings(
 
 
 def standing(small: Sequence[Reading], remarks: list[str]) -> list[Reading]:
-    """Returns readings of a standstill: where all wheels read exactly 0, without REST_S at both
-    ends, one each REST_EVERY_S."""
+    """Returns readings of a standstill, one each REST_EVERY_S, where all wheels read exactly 0.
+
+    REST_S at both ends is left out.
+    """
     rolled = sorted((m for m in small if m.sensor == WHEEL.number), key=lambda m: m.t_ns)
     times: list[int] = []
     for stands, stretch in groupby(rolled, key=lambda m: not np.any(m.value)):

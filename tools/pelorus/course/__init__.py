@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""`pelorus course`: the course report's figures and comparison, made anew (docs/COURSE.md)."""
+"""`pelorus course`: reproduces the course report's figures and comparison (docs/COURSE.md)."""

@@ -18,11 +18,11 @@ from pelorus.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, n
 
 COLUMN_IN, HEIGHT_1_IN, HEIGHT_2_IN = 7.0, 6.4, 6.0
 MARGIN = 0.08  # of the larger side
-STRAY = 0.4  # dead reckoning may widen the picture by so much of the larger side
+STRAY = 0.4  # of the larger side, by which dead reckoning may widen the picture
 
 
 def figure_1(trials: Sequence[Trial]) -> Figure:
-    """Dead reckoning, the course's filter and ours over truth or road, with the landmarks."""
+    """Draws dead reckoning, the course's filter and ours over truth or road, with the landmarks."""
     figure = new_figure(COLUMN_IN * len(trials), HEIGHT_1_IN)
     panels = figure.subplots(1, len(trials), squeeze=False)[0]
     for axes, trial in zip(panels, trials, strict=True):
@@ -61,7 +61,7 @@ def _trajectories(axes: Axes, trial: Trial) -> None:
 
 
 def _limit(axes: Axes, paths: dict[str, Floats], true: Floats | None) -> None:
-    """Around the two filters and the reference; dead reckoning may stray so far and no farther."""
+    """Sets limits around both filters and the reference; dead reckoning widens them to a limit."""
     core = np.concatenate([paths["course"], paths[OWN], *([] if true is None else [true])])
     side = Box(core.min(axis=0), core.max(axis=0)).side
     low, high = around(core, [paths["dead-reckoning"]], STRAY).grown(MARGIN * side)
@@ -70,7 +70,7 @@ def _limit(axes: Axes, paths: dict[str, Floats], true: Floats | None) -> None:
 
 
 def _shape(axes: Axes) -> float:
-    """Width to height, so that a narrow way leaves its room to a wide one."""
+    """Returns width to height, so that a narrow path leaves room to a wide one."""
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     return float(np.clip((right - left) / (high - low), 0.5, 2.0))
 
@@ -84,7 +84,7 @@ def _title(trial: Trial) -> str:
 
 
 def figure_2(trials: Sequence[Trial]) -> Figure:
-    """Above the whole map's trace, which falls; below that of the landmarks in the state."""
+    """Draws the whole map's trace above, which falls, and that of the state's landmarks below."""
     figure = new_figure(COLUMN_IN * len(trials), HEIGHT_2_IN)
     panels = figure.subplots(2, len(trials), squeeze=False, sharex="col")
     for (above, below), trial in zip(panels.T, trials, strict=True):

@@ -30,7 +30,7 @@ TRACES = 2  # the last columns
 
 
 def rows(trials: Sequence[Trial]) -> list[tuple[str, ...]]:
-    """Cells in the order of TITLES, a row a run."""
+    """Returns cells in the order of TITLES, a row a run."""
     return [_row(trial, name) for trial in trials for name in NAMES]
 
 
@@ -51,13 +51,13 @@ def _row(trial: Trial, name: str) -> tuple[str, ...]:
 
 
 def _range(values: Floats) -> str:
-    """From the first frame to the last."""
+    """Returns the first and the last frame's value, in words."""
     sound = values[np.isfinite(values)]
     return f"{sound[0]:,.0f} to {sound[-1]:,.0f}" if len(sound) else NONE
 
 
 def summary(trial: Trial) -> str:
-    """The two traces in a sentence."""
+    """Returns a sentence on the two traces."""
     found = trial.traces["course"]
     return (
         f"{trial.subject.title}: trace of the covariance of the course's filter: the whole map of "
@@ -66,6 +66,6 @@ def summary(trial: Trial) -> str:
 
 
 def markdown(trials: Sequence[Trial]) -> str:
-    """The table as text."""
+    """Returns the table as Markdown."""
     lines = [TITLES, ("---",) * 2 + ("---:",) * (len(TITLES) - 2), *rows(trials)]
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)

@@ -37,7 +37,7 @@ SEEN_LEAST = 3
 
 @dataclass(frozen=True)
 class Reference:
-    """What the trajectories are held against: a truth (in the subject), a road, or nothing."""
+    """The reference of the trajectories: a truth (in the subject), a road, or none."""
 
     road_m: Floats | None = None  # (n, 2)
 
@@ -59,7 +59,7 @@ class Trial:
 
     @cached_property
     def road_fits(self) -> dict[str, RoadFit]:
-        """Each trajectory fitted to the road on its own."""
+        """Returns the fit of each trajectory to the road, one by one."""
         way = self.reference.road_m
         if way is None or self.subject.truth is not None:
             return {}
@@ -67,22 +67,22 @@ class Trial:
 
     @property
     def traces(self) -> dict[str, Traces]:
-        """Of the runs that have landmarks with a covariance in metres: the course's."""
+        """Returns the traces of the course's run, whose landmarks have a covariance in metres."""
         return {COURSE: self.compared.whole_map}
 
     def flat(self, name: str, points: Floats) -> Floats:
-        """Points of a run's world (n, 3) -> the picture (n, 2)."""
+        """Returns points of a run's world (n, 3) in the picture (n, 2)."""
         if name in self.road_fits:
             return self.road_fits[name].place(points)
         poses = self.compared.main.trajectory.poses
         return plane.choose(self.subject.header.body_axes, poses).flat(points)
 
     def scatter(self, name: str) -> Floats:
-        """(n, 2): the landmarks of a run that are near and certain enough to be drawn."""
+        """Returns (n, 2) a run's landmarks that are near and certain enough to be drawn."""
         run = self.compared.run(name)
         try:
             seen = sightings(run.log, run.messages)
-        except PelorusError:  # no landmarks: nothing to draw
+        except PelorusError:  # no landmarks
             return np.empty((0, 2))
         distance = np.linalg.norm(seen.landmarks_W - seen.camera_W[seen.last_frame], axis=1)
         sigma = np.sqrt(np.linalg.eigvalsh(seen.spread)[:, -1])
@@ -91,7 +91,7 @@ class Trial:
 
     @cached_property
     def true_path(self) -> Floats | None:
-        """(n, 2): truth at the estimate's start, or the road; None without either."""
+        """Returns (n, 2) truth at the estimate's start, or the road; None without either."""
         if self.subject.truth is not None:
             accuracy = self.compared.accuracy["course"]
             return self.flat("course", apply(accuracy.A, self.subject.truth.poses.p))
@@ -99,19 +99,17 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Options:
-    """For the replay: of dead reckoning and Pelorus; and what the course's filter gets besides its
-    preset.
-    """
+class TrialOptions:
+    """Options of the replays: for dead reckoning and Pelorus, and for the course's filter."""
 
     ours: Sequence[str] = ()
     course: Sequence[str] = ()
 
 
 def carry_out_trial(
-    subject: Subject, reference: Reference, programs: Programs, options: Options, folder: Path
+    subject: Subject, reference: Reference, programs: Programs, options: TrialOptions, folder: Path
 ) -> Trial:
-    """Replay the recording; the files of the runs stay in the folder."""
+    """Replays the recording; the files of the runs stay in the folder."""
     found = plan_runs(programs, subject.path, options.ours, (COURSE,))
     planned = {plan.name: plan for plan in found}
     preset = planned[COURSE]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What went wrong on a drive, when, and what was seen before it: `pelorus explain`."""
+"""`pelorus explain`: what went wrong on a drive, when, and what was seen before it."""
 
 from pelorus.explain.explanation import Explanation, explain
 

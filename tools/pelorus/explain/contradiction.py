@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where pictures and odometry parted, measured anew: what the supervisor doubted is looked at by
-the motion that the stereo pairs alone show.
+"""Measures anew where pictures and odometry differ, by the motion of the stereo pairs alone.
 
 A frame is suspect if the supervisor says so, or if the gate rejected most of it. From some seconds
-before on, each step between two frames is compared: by the pictures, and by twists or gyro. What is
-usual between the two is learnt on the seconds before. Where the median of seven steps is off,
+before, each step between two frames is compared: by the pictures, and by twists or gyro. Their
+usual difference is learnt on the seconds before that. Where the median of seven steps is off,
 wheels slip or a gyro is wrong; one step that is off alone is a jump.
 """
 
@@ -16,45 +15,43 @@ from typing import NamedTuple
 import numpy as np
 
 from pelorus import motion, se3
-from pelorus.explain.finding import Cause, Finding, S
+from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.inputs import AXES
-from pelorus.explain.log import Flags, Log, runs, suspect
+from pelorus.explain.log import FilterLog, Flags, runs, suspect
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 from pelorus.visual_motion import PAIRS_MIN, distance2, estimate, rigid, seen_pairs
 
-APART_S = 2.0  # stretches with less between them are one
+APART_S = 2.0  # stretches with a shorter gap are joined
 LOOK_BACK_S = 2.0  # before the supervisor is sure
-LEARN_S = 5.0  # of what is usual, before that
+LEARN_S = 5.0  # before that, from which the usual difference is learnt
 LEARN_LEAST = 10  # steps
 LOOK_ON_S = 4.0
-LOOK_MOST_S = 30.0  # of what lasts on, to tell how long
-SIGMAS = 8.0  # of six numbers a step: chance does not reach it; learnt sigmas are rough
-MEDIAN_OF = 7  # steps: what their median differs by lasts
-MEDIAN_SIGMA = 1.2533  # of the median of many, times the root of their number, over one's sigma
-TOLD_SIGMAS = 4.0  # of the odometry, as a median: less is for the supervisor to doubt, not to tell
+LOOK_MOST_S = 30.0  # longest part of a lasting difference that is examined
+SIGMAS = 8.0  # limit for the six numbers of a step: learnt sigmas are rough
+MEDIAN_OF = 7  # steps: a difference of their median lasts
+MEDIAN_SIGMA = 1.2533  # sigma of a median of many, times the root of their number, over one's sigma
+TOLD_SIGMAS = 4.0  # of the odometry, for a median; the supervisor doubts smaller ones
 DOUBTS = (1, 2)  # departed, contradicted
 PIXEL_MOST_PX = 1e5  # no picture is larger
 SCALE_SIGMA = 0.03  # of a velocity: how well its scale is known
 SLOW_PX = 0.5
-NEAR_D2 = 4 * 13.28  # of a point that agrees with a motion: chance of one in 100 at 2 px
+NEAR_D2 = 4 * 13.28  # d^2 of a point that agrees with a motion: probability of one in 100 at 2 px
 MAD = 1.4826  # of a normal distribution: sigma over the median absolute deviation
 
 
 class Steps(NamedTuple):
-    """From frame `first + k` to the next: velocities (v, w) in the body, by each."""
+    """Body velocities (v, w) from frame `first + k` to the next, by pictures and by odometry."""
 
     first: int
     by_pictures: Floats  # (n, 6); NaN where too few points show it
-    by_odometry: (
-        Floats  # (n, 6); an IMU has no velocity: what the pictures mostly show stands there
-    )
+    by_odometry: Floats  # (n, 6); an IMU has no velocity: there it is the pictures' usual one
 
 
-def contradictions(log: Log) -> Iterator[Finding]:
-    """One for each stretch of suspect frames that differs from what was before it."""
+def contradictions(log: FilterLog) -> Iterator[Incident]:
+    """Yields a finding for each stretch of suspect frames that differs from what was before it."""
     if not len(log.readings):
         return
     for first, last in _stretches(log):
@@ -63,7 +60,7 @@ def contradictions(log: Log) -> Iterator[Finding]:
             yield found
 
 
-def _stretches(log: Log) -> list[tuple[int, int]]:
+def _stretches(log: FilterLog) -> list[tuple[int, int]]:
     out: list[tuple[int, int]] = []
     for first, last in runs(suspect(log)):
         if out and log.t_ns[first] - log.t_ns[out[-1][1]] < APART_S * S:
@@ -73,7 +70,7 @@ def _stretches(log: Log) -> list[tuple[int, int]]:
     return out
 
 
-def _looked_at(log: Log, first: int, last: int) -> Finding | None:
+def _looked_at(log: FilterLog, first: int, last: int) -> Incident | None:
     begin = log.t_ns[first]
     low = int(np.searchsorted(log.t_ns, begin - (LOOK_BACK_S + LEARN_S) * S))
     lasts_s = min((log.t_ns[last] - begin) / S, LOOK_MOST_S)
@@ -85,7 +82,7 @@ def _looked_at(log: Log, first: int, last: int) -> Finding | None:
     learn: Flags = np.asarray(log.t_ns[low + 1 : high] < begin - LOOK_BACK_S * S)
     known: Flags = np.asarray(np.isfinite(off).all(axis=1))
     if np.count_nonzero(learn & known) < LEARN_LEAST:
-        learn[: max(first - low - 2, 0)] = True  # a drive that has just begun
+        learn[: max(first - low - 2, 0)] = True  # for a drive that has just begun
     if np.count_nonzero(learn & known) < LEARN_LEAST:
         return _as_told(log, first, last)
     usual = np.median(off[learn & known], axis=0)
@@ -100,9 +97,10 @@ def _looked_at(log: Log, first: int, last: int) -> Finding | None:
     return _jump(log, steps, int(odd[0])) if len(odd) else None
 
 
-def _as_told(log: Log, first: int, last: int) -> Finding | None:
-    """Where too few points were in sight before to measure it: as the supervisor has it, if what it
-    doubts is the odometry, and agreed with it before.
+def _as_told(log: FilterLog, first: int, last: int) -> Incident | None:
+    """Returns the supervisor's finding where too few points were seen before to measure one.
+
+    It must doubt the odometry, and have agreed with it before.
     """
     doubted = [e for e in log.evidence[first : last + 1] if e is not None and e.doubt in DOUBTS]
     if not doubted:
@@ -118,13 +116,15 @@ def _as_told(log: Log, first: int, last: int) -> Finding | None:
     cause = Cause.TURN_CONTRADICTED if axis >= 3 else Cause.CONTRADICTED
     if axis < 3 and not log.by_imu:
         cause = Cause.SLIP
-    return Finding(cause, int(log.t_ns[first]), int(log.t_ns[last]), words)
+    return Incident(cause, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-def _least_sigma(log: Log, steps: Steps) -> Floats:
-    """(n, 6): what a difference is never less uncertain than. The sigmas of the readings, as usual
-    on this drive; some per cent of the motion, for wheels and cameras are calibrated no better; of
-    a turn what half a pixel is, by which tracks may wander together.
+def _least_sigma(log: FilterLog, steps: Steps) -> Floats:
+    """Returns (n, 6) lower limits of the differences' sigmas.
+
+    They are the usual sigmas of the readings on this drive; some per cent of the motion, for wheels
+    and cameras are calibrated no better; and for turns half a pixel, by which tracks may drift
+    together.
     """
     told = np.nan_to_num(np.abs(steps.by_odometry))
     motion = np.maximum(told, np.nan_to_num(np.abs(steps.by_pictures)))
@@ -139,7 +139,7 @@ def _least_sigma(log: Log, steps: Steps) -> Floats:
 
 
 def _lasting(off: Floats) -> Floats:
-    """By how many of its own sigmas the median of the next steps is off, for each step (n, 6)."""
+    """Returns (n, 6) by how many of its sigmas the median of the next steps is off."""
     out = np.zeros_like(off)
     for k in range(len(off) - MEDIAN_OF + 1):
         window = off[k : k + MEDIAN_OF]
@@ -150,7 +150,7 @@ def _lasting(off: Floats) -> Floats:
     return out
 
 
-def _jump(log: Log, steps: Steps, k: int) -> Finding:
+def _jump(log: FilterLog, steps: Steps, k: int) -> Incident:
     t = log.t_ns[steps.first :]
     tau_s = float(t[k + 1] - t[k]) / S
     moved = (steps.by_pictures[k] - steps.by_odometry[k]) * tau_s
@@ -158,14 +158,16 @@ def _jump(log: Log, steps: Steps, k: int) -> Finding:
     whose = "IMU" if log.by_imu else "odometry"
     words = f"the body jumped by {m:.2f} m and {deg:.1f} deg from one frame to the next, and the "
     words += f"{whose} tells nothing of it: carried, pushed, hit"
-    return Finding(Cause.JUMP, int(t[k + 1]), int(t[k + 1]), words)
+    return Incident(Cause.JUMP, int(t[k + 1]), int(t[k + 1]), words)
 
 
-def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, int]) -> Finding:
-    """Pictures and odometry differ from step k on; told where they differ most, soon after."""
+def _part(
+    log: FilterLog, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, int]
+) -> Incident:
+    """Returns the finding that pictures and odometry differ from step k on."""
     soon = lasting[k : k + MEDIAN_OF]
     times = soon.max(axis=0)
-    along = times[:3] > SIGMAS  # wheels that slip turn wrongly, too
+    along = times[:3] > SIGMAS  # slipping wheels turn wrongly, too
     axis = int(np.argmax(times[:3] if along.any() and not log.by_imu else times))
     worst = k + int(np.argmax(soon[:, axis]))
     near = slice(max(worst - MEDIAN_OF // 2, 0), worst + MEDIAN_OF // 2 + 1)
@@ -180,16 +182,16 @@ def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, i
             f"the odometry says {told:.2f} m/s along {AXES[axis]}, the pictures {seen:.2f} m/s: "
             "wheels slip, or what the camera sees moves along"
         )
-        return Finding(Cause.SLIP, begin, end, words, noticed)
+        return Incident(Cause.SLIP, begin, end, words, noticed)
     words = (
         f"the {'gyro' if log.by_imu else 'odometry'} says {told:.3f} rad/s about {AXES[axis - 3]}, "
         f"the pictures {seen:.3f} rad/s"
     )
-    return Finding(Cause.TURN_CONTRADICTED, begin, end, words, noticed)
+    return Incident(Cause.TURN_CONTRADICTED, begin, end, words, noticed)
 
 
-def _end(log: Log, steps: Steps, k: int, lasting: Floats, last: int) -> int:
-    """Until when the two differ, which may be less than the doubt; the doubt's end if unseen."""
+def _end(log: FilterLog, steps: Steps, k: int, lasting: Floats, last: int) -> int:
+    """Returns when the difference ends, or the doubt's end if it is not seen."""
     off = np.flatnonzero((lasting[k:] > SIGMAS).any(axis=1))
     apart = np.flatnonzero(np.diff(off) > MEDIAN_OF)
     end = k + int(off[apart[0]] if len(apart) else off[-1])
@@ -197,8 +199,8 @@ def _end(log: Log, steps: Steps, k: int, lasting: Floats, last: int) -> int:
     return int(log.t_ns[steps.first + end + 1] if known else log.t_ns[last])
 
 
-def measured(log: Log, low: int, high: int) -> Steps:
-    """The steps between the frames from `low` to below `high`."""
+def measured(log: FilterLog, low: int, high: int) -> Steps:
+    """Returns the steps between the frames from `low` to below `high`."""
     t = log.t_ns[low:high]
     tau = np.diff(t)[:, None] / S
     tau = np.where(tau > 0, tau, np.nan)
@@ -211,10 +213,11 @@ def measured(log: Log, low: int, high: int) -> Steps:
     return Steps(low, seen, by_odometry)
 
 
-def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Flags]:
-    """In the body, and of which steps enough points show it. The search begins where the filter
-    says that the body went, where odometry says so, and where the points in space fit best: what
-    most points agree with holds.
+def _by_pictures(log: FilterLog, low: int, high: int, told: Poses) -> tuple[Poses, Flags]:
+    """Returns the body's motions by the pictures, and which steps have enough points.
+
+    The search starts from the filter's motion, from the odometry's, and from the best fit of the
+    points in space; the result is the one with which most points agree.
     """
     frames = log.frames[low:high]
     count = len(frames)
@@ -242,12 +245,12 @@ def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Fla
             np.where(better[:, None, None], found.R, best.R),
             np.where(better[:, None], found.p, best.p),
         )
-    enough = (most >= PAIRS_MIN) & (3 * most >= 2 * seen.counts())  # else it is not known
+    enough = (most >= PAIRS_MIN) & (3 * most >= 2 * seen.counts())  # else it is unknown
     return turned(there, best, T_CB), np.asarray(enough)
 
 
-def _by_filter(log: Log, low: int, high: int) -> Poses:
-    """How the filter's pose went from frame to frame; where a frame was refused it stood still."""
+def _by_filter(log: FilterLog, low: int, high: int) -> Poses:
+    """Returns the filter's motions from frame to frame; none where a frame was refused."""
     R, p = np.eye(3), np.zeros(3)
     rows = []
     for pose in log.poses[low:high]:
@@ -258,8 +261,8 @@ def _by_filter(log: Log, low: int, high: int) -> Poses:
     return se3.compose(se3.inverse(poses.at(slice(None, -1))), poses.at(slice(1, None)))
 
 
-def _by_odometry(log: Log, t: Times) -> Poses:
-    """By twists, or by the gyro alone."""
+def _by_odometry(log: FilterLog, t: Times) -> Poses:
+    """Returns the motions by twists, or by the gyro alone."""
     order = np.argsort(log.reading_ns, kind="stable")
     stamps, readings = log.reading_ns[order], log.readings[order]
     v = np.zeros_like(readings[:, :3]) if log.by_imu else readings[:, :3]
@@ -268,7 +271,7 @@ def _by_odometry(log: Log, t: Times) -> Poses:
 
 
 def _smooth(values: Floats) -> Floats:
-    """Of each number the median of eleven around it, without those that are not known."""
+    """Returns the moving median of eleven values, ignoring unknown ones."""
     out = np.full_like(values, np.nan)
     for k in range(len(values)):
         around = values[max(k - 5, 0) : k + 6]

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All that is found in a log, put together: episodes with their first cause, what followed, and
-what was seen before.
-"""
+"""Collects a log's incidents in episodes: first cause, consequences, what was seen before."""
 
 from __future__ import annotations
 
@@ -14,9 +12,9 @@ import numpy as np
 
 from pelorus import schema
 from pelorus.explain.contradiction import contradictions
-from pelorus.explain.finding import Cause, Finding, S
+from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.inputs import of_inputs, rejected
-from pelorus.explain.log import FEW, Flags, Log, log_of, runs
+from pelorus.explain.log import FEW, FilterLog, Flags, log_of, runs
 from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
 from pelorus.explain.small import of_small
 from pelorus.explain.stamps import of_stamps
@@ -28,11 +26,11 @@ if TYPE_CHECKING:
 
 NOT_POSITIVE = schema.number("reason", "NOT_POSITIVE")
 
-APART_NS = S  # what begins later than that after the end of another is an episode of its own
-TOGETHER_NS = S  # what begins within is told in the order of causes
-BEFORE_NS = S  # what was seen before: the last second
+APART_NS = S  # what begins this long after the end of another is an episode of its own
+TOGETHER_NS = S  # of events within a second the one that causes the others comes first
+BEFORE_NS = S  # figures are given for the last second before
 LINES = 20
-LASTS_S = 0.05  # what is shorter is a moment
+LASTS_S = 0.05  # anything shorter is called a moment
 EPISODES_TOLD = 4
 SPELLS_TOLD = 3
 TEXTS_TOLD = 3
@@ -40,10 +38,10 @@ TEXTS_TOLD = 3
 
 @dataclass(frozen=True)
 class Episode:
-    """`first` is the cause, `others` what else went wrong, `spells` the health meanwhile."""
+    """An episode: `first` is its cause, `others` its consequences, `spells` the health."""
 
-    first: Finding
-    others: tuple[Finding, ...]
+    first: Incident
+    others: tuple[Incident, ...]
     spells: tuple[Spell, ...]
     before: str
 
@@ -53,14 +51,14 @@ class Episode:
 
     @property
     def to_ns(self) -> int:
-        """When its last finding ends, and health is good again."""
+        """Returns when its last finding ends and health is good again."""
         ends = [f.to_ns for f in (self.first, *self.others)] + [s.to_ns for s in self.spells]
         return max(ends)
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """Of a whole log."""
+    """What was found in a whole log."""
 
     origin_ns: int
     end_ns: int
@@ -68,36 +66,36 @@ class Explanation:
     setup: tuple[str, ...]
     health: TimeLine
     remarks: tuple[str, ...] = ()  # what the log lacks
-    unexplained: tuple[Spell, ...] = ()  # health that was not good, and no finding says why
+    unexplained: tuple[Spell, ...] = ()  # spells of bad health that no finding explains
     messages: Sequence[Message] = field(default=(), repr=False, compare=False)
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Whether the run can be trusted, as every command says it."""
+        """Returns the verdict on the run, as in every command."""
         from pelorus.check.verdict import verdict_of_log  # noqa: PLC0415 - it takes seconds
 
         return verdict_of_log(self.messages)
 
     @property
     def diverged(self) -> int:
-        """How many of the episodes are divergences."""
+        """Returns the number of episodes that are divergences."""
         return sum(episode.first.cause is Cause.DIVERGED for episode in self.episodes)
 
     @property
-    def first(self) -> Finding | None:
-        """The first cause of the first episode, else what is wrong all along."""
+    def first(self) -> Incident | None:
+        """Returns the first cause of the first episode, else what is wrong throughout."""
         if self.episodes:
             return self.episodes[0].first
         if self.setup:
-            return Finding(Cause.SETTINGS, self.origin_ns, self.end_ns, self.setup[0])
+            return Incident(Cause.SETTINGS, self.origin_ns, self.end_ns, self.setup[0])
         return None
 
     def seconds(self, t_ns: int) -> float:
-        """Since the first frame."""
+        """Returns the time since the first frame, s."""
         return (t_ns - self.origin_ns) / S
 
     def lines(self) -> list[str]:
-        """At most twenty, without the verdict."""
+        """Returns at most twenty lines, without the verdict."""
         out = list(self._head())
         out += [f"log: {words}" for words in self.remarks]
         out += [f"setup: {words}" for words in self.setup]
@@ -112,7 +110,7 @@ class Explanation:
         return out[:LINES]
 
     def _most_telling(self) -> list[tuple[int, Episode]]:
-        """With their numbers, in the order of time: divergences before all others."""
+        """Returns the most important episodes with their numbers, divergences first."""
         numbered = list(enumerate(self.episodes, 1))
         worst = sorted(numbered, key=lambda one: one[1].first.cause is not Cause.DIVERGED)
         return sorted(worst[:EPISODES_TOLD], key=lambda one: one[0])
@@ -141,7 +139,7 @@ class Explanation:
         return [f"{number}. {span}: {head}", *(f"   {words}" for words in lines)][: max(room, 2)]
 
     def told_of(self, episode: Episode) -> list[str]:
-        """The first cause, what was seen before, what to do, and what followed in its order."""
+        """Returns an episode's lines: first cause, what was seen before, advice, consequences."""
         first = episode.first
         then = [(f.from_ns, self._follows(f, first)) for f in episode.others]
         then += [(s.from_ns, s.words(self.origin_ns)) for s in episode.spells]
@@ -152,18 +150,18 @@ class Explanation:
             *(words for _, words in sorted(then)),
         ]
 
-    def _follows(self, one: Finding, first: Finding) -> str:
+    def _follows(self, one: Incident, first: Incident) -> str:
         by_it = one.rank > first.rank and one.from_ns <= first.to_ns + TOGETHER_NS
         why = ", probably by it" if by_it else ""
         return f"{self.seconds(one.from_ns):.2f} s{why}: {one.cause}: {one.words}"
 
-    def _lasting(self, found: Finding) -> str:
-        """For how long, if it lasted."""
+    def _lasting(self, found: Incident) -> str:
+        """Returns how long it lasted, in words; empty if it was a moment."""
         seconds = self.seconds(found.to_ns) - self.seconds(found.from_ns)
         return f", {seconds:.1f} s long" if seconds >= LASTS_S else ""
 
     def json(self) -> dict[str, Any]:
-        """Times in seconds since the first frame, and in ns as in the log."""
+        """Returns the result as JSON, with times in s since the first frame, and in ns."""
         return {
             "happened": bool(self.episodes),
             "first_cause": None if self.first is None else self._finding(self.first),
@@ -186,7 +184,7 @@ class Explanation:
             "duration_s": self.seconds(self.end_ns),
         }
 
-    def _finding(self, found: Finding) -> dict[str, Any]:
+    def _finding(self, found: Incident) -> dict[str, Any]:
         return {
             "cause": found.cause,
             "from_s": self.seconds(found.from_ns),
@@ -198,10 +196,10 @@ class Explanation:
 
 
 def explain(messages: Sequence[Message]) -> Explanation:
-    """Of the messages of a log; PelorusError where no filter answered."""
+    """Explains a log; raises PelorusError where no filter answered."""
     log = log_of(messages)
     health = time_line(messages)
-    assert health is not None  # log_of has refused a log without answers
+    assert health is not None  # log_of refuses a log without answers
     inputs = [*of_stamps(log), *of_inputs(log)]
     odd = (*of_small(log, messages), *(_behind(one, inputs) for one in contradictions(log)))
     found = sorted((*inputs, *odd), key=_order)
@@ -210,7 +208,7 @@ def explain(messages: Sequence[Message]) -> Explanation:
     setup = tuple(of_setup(log, calm))
     if gated_share(log, calm) <= GATED_MOST:
         found += [one for one in rejected(log) if not _near(one, found)]
-    if not setup:  # a filter whose sigmas are wrong is lost now and then, and nothing happened
+    if not setup:  # with wrong sigmas a filter is lost now and then without an event
         found += list(_unexplained(log, health, found))
     groups = [*_grouped(sorted(found, key=_order)), *_grouped(list(divergences(log)))]
     groups.sort(key=lambda group: _order(group[0]))
@@ -223,7 +221,7 @@ def explain(messages: Sequence[Message]) -> Explanation:
     return Explanation(log.origin_ns, end_ns, episodes, setup, health, remarks, rest, messages)
 
 
-def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
+def _remarks(log: FilterLog, messages: Sequence[Message]) -> Iterator[str]:
     if not any(log.evidence):
         yield (
             "it holds no EVIDENCE, so it is not known what the supervisor saw: it comes from an "
@@ -240,17 +238,17 @@ def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
         yield f"and {len(texts) - TEXTS_TOLD} remarks more: pelorus info"
 
 
-def divergences(log: Log) -> Iterator[Finding]:
-    """Frames after which a variance was not positive: arithmetic that failed, whatever came in."""
+def divergences(log: FilterLog) -> Iterator[Incident]:
+    """Yields frames after which a variance was not positive: the arithmetic failed."""
     for first, last in runs(log.said(NOT_POSITIVE)):
         count = last - first + 1
         words = f"a variance ceased to be positive in {count} frame{'s' * (count > 1)}; the filter "
         words += "went on from its pose and dropped its landmarks"
-        yield Finding(Cause.DIVERGED, int(log.t_ns[first]), int(log.t_ns[last]), words)
+        yield Incident(Cause.DIVERGED, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-def _behind(found: Finding, inputs: Sequence[Finding]) -> Finding:
-    """What the filter noticed when an input failed came of that, whatever looked odd before."""
+def _behind(found: Incident, inputs: Sequence[Incident]) -> Incident:
+    """Returns the finding; if the filter noticed it when an input failed, it begins there."""
     if found.noticed_ns is None:
         return found
     near = [f for f in inputs if abs(f.from_ns - found.noticed_ns) <= TOGETHER_NS]
@@ -258,19 +256,19 @@ def _behind(found: Finding, inputs: Sequence[Finding]) -> Finding:
     return found._replace(from_ns=max(begin, found.from_ns))
 
 
-def _order(found: Finding) -> tuple[int, int]:
+def _order(found: Incident) -> tuple[int, int]:
     return found.from_ns, found.rank
 
 
-def _calm(log: Log, begin_ns: int | None) -> Flags:
-    """Frames before the first event; all of them where there are too few, or no event."""
+def _calm(log: FilterLog, begin_ns: int | None) -> Flags:
+    """Returns the frames before the first event; all where they are few or there is no event."""
     if begin_ns is None:
         return np.ones(len(log.t_ns), bool)
     return np.asarray(log.t_ns < begin_ns)
 
 
-def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterator[Finding]:
-    """Where the filter was lost and nothing that is found tells why."""
+def _unexplained(log: FilterLog, health: TimeLine, found: Sequence[Incident]) -> Iterator[Incident]:
+    """Yields spells where the filter was lost and no finding explains it."""
     for spell in health.spells:
         if spell.health < LOST or _near(spell, (*found, *divergences(log))):
             continue
@@ -278,20 +276,20 @@ def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterat
         seen = log.column("observations")[meanwhile]
         if len(seen) and np.median(seen) < FEW:
             words = f"{np.median(seen):.0f} points in sight: darkness, or nothing to see"
-            yield Finding(Cause.LOST_TRACKS, spell.from_ns, spell.to_ns, words)
+            yield Incident(Cause.LOST_TRACKS, spell.from_ns, spell.to_ns, words)
         else:
             words = f"the filter was lost: {', '.join(spell.why)}"
-            yield Finding(Cause.LOST, spell.from_ns, spell.to_ns, words)
+            yield Incident(Cause.LOST, spell.from_ns, spell.to_ns, words)
 
 
-def _near(one: Finding | Spell, found: Sequence[Finding]) -> bool:
+def _near(one: Incident | Spell, found: Sequence[Incident]) -> bool:
     return any(
         f.from_ns - APART_NS <= one.to_ns and one.from_ns <= f.to_ns + APART_NS for f in found
     )
 
 
-def _grouped(found: Sequence[Finding]) -> list[list[Finding]]:
-    groups: list[list[Finding]] = []
+def _grouped(found: Sequence[Incident]) -> list[list[Incident]]:
+    groups: list[list[Incident]] = []
     end = 0
     for one in found:
         if groups and one.from_ns <= end + APART_NS:
@@ -303,7 +301,7 @@ def _grouped(found: Sequence[Finding]) -> list[list[Finding]]:
     return groups
 
 
-def _episode(log: Log, group: Sequence[Finding], health: TimeLine) -> Episode:
+def _episode(log: FilterLog, group: Sequence[Incident], health: TimeLine) -> Episode:
     begin = group[0].from_ns
     together = [f for f in group if f.from_ns <= begin + TOGETHER_NS]
     first = min(together, key=lambda f: (f.rank, f.from_ns))
@@ -315,8 +313,8 @@ def _episode(log: Log, group: Sequence[Finding], health: TimeLine) -> Episode:
     return Episode(first, others, spells, _before(log, first.from_ns))
 
 
-def _before(log: Log, t_ns: int) -> str:
-    """The last second before it, in figures."""
+def _before(log: FilterLog, t_ns: int) -> str:
+    """Returns figures of the last second before it."""
     rows = (log.arrived_ns < t_ns) & (log.arrived_ns >= t_ns - BEFORE_NS)
     if not rows.any():
         return "it began with it"

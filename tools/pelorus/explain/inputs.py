@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong with readings, pictures and tracks themselves. Nothing of it needs the filter's
-opinion but whether the body moved.
+"""Finds faults of readings, pictures and tracks themselves.
+
+They do not depend on the filter's opinion, except on whether the body moved.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.ndimage import median_filter
 
-from pelorus.explain.finding import Cause, Finding, S
-from pelorus.explain.log import CONTRADICTED, FEW, Flags, Log, period, runs, suspect
+from pelorus.explain.incident import Cause, Incident, S
+from pelorus.explain.log import CONTRADICTED, FEW, FilterLog, Flags, period, runs, suspect
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.schema import number
@@ -21,8 +22,8 @@ FROZEN_IMAGE = number("reason", "FROZEN_IMAGE")
 AXES = "xyz"
 
 
-def of_inputs(log: Log) -> Iterator[Finding]:
-    """All of it."""
+def of_inputs(log: FilterLog) -> Iterator[Incident]:
+    """Yields all findings on the inputs."""
     yield from stuck(log)
     yield from shocks(log)
     yield from frozen(log)
@@ -32,14 +33,14 @@ def of_inputs(log: Log) -> Iterator[Finding]:
 # --- readings -------------------------------------------------------------------------------------
 
 STUCK_S, STUCK_READINGS = 0.5, 5
-BY_CHANCE = 1e-6  # expected number of such stretches in the drive, if readings repeat by chance
+BY_CHANCE = 1e-6  # expected number of such stretches in the drive if readings repeat by chance
 
 
-def stuck(log: Log) -> Iterator[Finding]:
-    """An axis that else changes from reading to reading reads the very same number for long.
+def stuck(log: FilterLog) -> Iterator[Incident]:
+    """Yields axes that repeat one number for long, and otherwise change from reading to reading.
 
-    Zeros are what wheels at rest read: they are told where the pictures contradict them, and of a
-    turn rate where the body goes on.
+    Wheels at rest read zero: that is reported where the pictures contradict it, and for a turn rate
+    where the body moves on.
     """
     blocks = (
         (Cause.DEAD_ACCELEROMETER, "accelerometer", 0)
@@ -61,11 +62,11 @@ def stuck(log: Log) -> Iterator[Finding]:
                     f"{AXES[axis % 3]} at {x:.3g}" for axis, x in zip(axes, value, strict=True)
                 )
                 words = f"the {name} is stuck for {last - first + 1} readings: {numbers}"
-                yield Finding(cause, begin, end, words)
+                yield Incident(cause, begin, end, words)
 
 
-def _repeats(log: Log, axis: int) -> Iterator[tuple[int, int]]:
-    """First and last reading of each long stretch of one number, which chance does not make."""
+def _repeats(log: FilterLog, axis: int) -> Iterator[tuple[int, int]]:
+    """Yields first and last reading of each stretch of one number that is too long for chance."""
     same = np.diff(log.readings[:, axis]) == 0
     for first, last in runs(same):
         length = last - first + 1
@@ -78,22 +79,22 @@ def _repeats(log: Log, axis: int) -> Iterator[tuple[int, int]]:
             yield first, last + 1
 
 
-def _goes(log: Log, first: int, last: int) -> bool:
+def _goes(log: FilterLog, first: int, last: int) -> bool:
     return bool(log.readings[first : last + 1, :3].any(axis=1).mean() > 0.5)
 
 
-def _contradicted(log: Log, begin: int, end: int) -> bool:
+def _contradicted(log: FilterLog, begin: int, end: int) -> bool:
     meanwhile = (log.t_ns >= begin) & (log.t_ns <= end)
     return bool((log.said(CONTRADICTED) & meanwhile).any())
 
 
-FAR = 10.0  # times what 19 of 20 readings differ from their neighbourhood's median
-NEIGHBOURHOOD_S = 2.0  # shorter than a slip, longer than a hit
+FAR = 10.0  # factor of the deviation that 19 of 20 readings stay within
+NEIGHBOURHOOD_S = 2.0  # shorter than a slip, longer than an impact
 HIT_MOST_S = 1.0
 
 
-def shocks(log: Log) -> Iterator[Finding]:
-    """Readings far from the median of their neighbourhood, for less than a second."""
+def shocks(log: FilterLog) -> Iterator[Incident]:
+    """Yields readings far from the median of their neighbourhood, for less than a second."""
     if len(log.readings) < 2 * STUCK_READINGS:
         return
     window = max(round(NEIGHBOURHOOD_S * S / max(period(log.reading_ns), 1.0)), STUCK_READINGS)
@@ -104,19 +105,20 @@ def shocks(log: Log) -> Iterator[Finding]:
     for first, last in _joined(times.max(axis=1) > FAR, log.reading_ns):
         begin, end = int(log.reading_ns[first]), int(log.reading_ns[last])
         if end - begin <= HIT_MOST_S * S and _suffered(log, begin, end):
-            yield Finding(Cause.SHOCK, begin, end, _hit(log, times, first, last))
+            yield Incident(Cause.SHOCK, begin, end, _hit(log, times, first, last))
 
 
-def _suffered(log: Log, begin: int, end: int) -> bool:
-    """Whether a reading was refused, or a frame found odd, meanwhile or soon after: else the filter
-    took it in its stride.
+def _suffered(log: FilterLog, begin: int, end: int) -> bool:
+    """Returns whether a reading was refused or a frame suspect, then or soon after.
+
+    Otherwise the filter coped with it.
     """
     refused = any(begin <= report.t_ns <= end for report in log.refused)
     meanwhile = (log.t_ns >= begin) & (log.t_ns <= end + S)
     return refused or bool((suspect(log) & meanwhile).any())
 
 
-def _hit(log: Log, times: Floats, first: int, last: int) -> str:
+def _hit(log: FilterLog, times: Floats, first: int, last: int) -> str:
     row, axis = np.unravel_index(np.argmax(times[first : last + 1]), (last - first + 1, 6))
     value = log.readings[first + int(row), axis]
     quantity = ("acceleration" if log.by_imu else "velocity", "m/s²" if log.by_imu else "m/s")
@@ -130,7 +132,7 @@ def _hit(log: Log, times: Floats, first: int, last: int) -> str:
 
 
 def _joined(flags: Flags, t_ns: Times) -> list[tuple[int, int]]:
-    """Stretches of yes, those within half a second as one."""
+    """Returns the stretches of True, joined across gaps of half a second."""
     out: list[tuple[int, int]] = []
     for first, last in runs(flags):
         if out and t_ns[first] - t_ns[out[-1][1]] <= S // 2:
@@ -143,8 +145,8 @@ def _joined(flags: Flags, t_ns: Times) -> list[tuple[int, int]]:
 # --- pictures -------------------------------------------------------------------------------------
 
 
-def frozen(log: Log) -> Iterator[Finding]:
-    """The same pixels again, and the filter knows that the body moved."""
+def frozen(log: FilterLog) -> Iterator[Incident]:
+    """Yields stretches of identical pixels in which the filter knows that the body moved."""
     same = (log.shared >= FEW) & (2 * log.repeated >= log.shared)
     told = log.said(FROZEN_IMAGE)
     for first, last in runs(same):
@@ -152,16 +154,16 @@ def frozen(log: Log) -> Iterator[Finding]:
             words = (
                 f"the picture is frozen: {last - first + 1} frames repeat the pixels of the first"
             )
-            yield Finding(Cause.FROZEN_PICTURE, int(log.t_ns[first]), int(log.t_ns[last]), words)
+            yield Incident(Cause.FROZEN_PICTURE, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-BEFORE = 10  # frames that tell how many points are usually followed
-HABIT_S = 10.0  # what happens more often than that is no event, it is how the front end works
+BEFORE = 10  # frames that show how many points are usually followed
+HABIT_S = 10.0  # what happens more often is no event, but how the front end works
 TRACKED = 2 * FEW  # points that a frame mostly shares with the one before, where tracks can be lost
 
 
-def losses(log: Log) -> list[tuple[int, int]]:
-    """Frames in a row that share too few points with the ones before, where it was otherwise."""
+def losses(log: FilterLog) -> list[tuple[int, int]]:
+    """Returns stretches of frames that share unusually few points with the ones before."""
     few = log.shared < FEW
     few[0] = False
     out = []
@@ -172,14 +174,14 @@ def losses(log: Log) -> list[tuple[int, int]]:
     return out
 
 
-def is_habit(log: Log, lost: list[tuple[int, int]], length: int) -> bool:
-    """Whether losses of at least this length come more often than every ten seconds."""
+def is_habit(log: FilterLog, lost: list[tuple[int, int]], length: int) -> bool:
+    """Returns whether losses of at least this length come more often than every ten seconds."""
     whole_s = float(log.t_ns.max() - log.t_ns.min()) / S
     return sum(last - first >= length for first, last in lost) > max(whole_s / HABIT_S, 2.0)
 
 
-def lost_tracks(log: Log) -> Iterator[Finding]:
-    """No point is followed from a frame to the next: darkness, blur, a tracker that began anew."""
+def lost_tracks(log: FilterLog) -> Iterator[Incident]:
+    """Yields frames to which no point was followed: darkness, blur, a tracker that restarted."""
     lost = losses(log)
     for first, last in lost:
         if is_habit(log, lost, last - first):
@@ -189,14 +191,14 @@ def lost_tracks(log: Log) -> Iterator[Finding]:
         what = "few points in sight" if dark else "all points have new ids"
         frames = f"{last - first + 1} frames" if last > first else "one frame"
         words = f"tracks lost, {what}: {frames}; {before} points were followed before"
-        yield Finding(Cause.LOST_TRACKS, int(log.t_ns[first]), int(log.t_ns[last]), words)
+        yield Incident(Cause.LOST_TRACKS, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-REJECTED_FRAMES = 2  # one is no event
+REJECTED_FRAMES = 2  # frames: a single one is no event
 
 
-def rejected(log: Log) -> Iterator[Finding]:
-    """The gate rejects most of what is seen, for some frames."""
+def rejected(log: FilterLog) -> Iterator[Incident]:
+    """Yields stretches of frames in which the gate rejects most observations."""
     matched, gated = log.column("matched"), log.column("gated")
     most = (matched >= PAIRS_MIN) & (2 * gated > matched)
     for first, last in runs(most):
@@ -208,4 +210,4 @@ def rejected(log: Log) -> Iterator[Finding]:
             f"the gate rejects {share:.0%} of the matches for {count} frames: blur, wrong matches, "
             "or much that moves by itself"
         )
-        yield Finding(Cause.WRONG_MATCHES, int(log.t_ns[first]), int(log.t_ns[last]), words)
+        yield Incident(Cause.WRONG_MATCHES, int(log.t_ns[first]), int(log.t_ns[last]), words)

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A filter's log by column: each stereo frame beside what the filter and its supervisor said of it,
-and every reading.
-"""
+"""A filter's log by column: stereo frames with their answers, and readings."""
 
 from __future__ import annotations
 
@@ -28,16 +26,18 @@ from pelorus.wire import header_of_messages
 Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 Pixels = NDArray[np.float32]
-FEW = 3  # points: fewer fix no pose
+FEW = 3  # fewer points fix no pose
 NO_READING = -1
 CONTRADICTED = number("reason", "TWIST_CONTRADICTED") | number("reason", "POSE_MAY_BE_WRONG")
 ODD_FLAGS = EvidenceFlag.OUTRIGHT | EvidenceFlag.WAITS | EvidenceFlag.LOCKED
 
 
 @dataclass(frozen=True)
-class Log:
-    """`frames` in the order of arrival, each with its answer, and with its evidence where the log
-    has some. `behind_ns` is the stamp of the newest reading that had arrived before the frame.
+class FilterLog:
+    """A filter's log.
+
+    `frames` are in the order of arrival, each with its answer, and with its evidence where the log
+    has it. `behind_ns` is the stamp of the newest reading that had arrived before the frame.
     """
 
     header: Header
@@ -50,8 +50,8 @@ class Log:
     readings: Floats  # (n, 6): v, w of twists; a, w of an IMU
     by_imu: bool
     refused: list[Report]  # of readings
-    sigma: Floats  # (6,) of a twist reading as the filter had it; zeros where it says nothing
-    bias_sigma: Floats  # (6,) likewise, of the biases before anything was seen
+    sigma: Floats  # (6,) of a twist reading in the filter; zeros where it is unknown
+    bias_sigma: Floats  # (6,) priors of the biases, likewise
     _columns: dict[str, Counts] = field(default_factory=dict)
 
     @cached_property
@@ -60,7 +60,7 @@ class Log:
 
     @cached_property
     def arrived_ns(self) -> Times:
-        """When a frame came, by the readings' clock; by its own stamp where there are none."""
+        """Returns when frames came, by the readings' clock; without readings their stamps."""
         return np.where(self.behind_ns == NO_READING, self.t_ns, self.behind_ns)
 
     @property
@@ -68,7 +68,7 @@ class Log:
         return int(self.t_ns[0])
 
     def column(self, name: str) -> Counts:
-        """Of REPORT."""
+        """Returns a column of the REPORTs by its name."""
         if name not in self._columns:
             found = (getattr(report, name) for report in self.reports)
             self._columns[name] = np.fromiter(found, np.int64, len(self.reports))
@@ -79,27 +79,27 @@ class Log:
         return self.column("reasons")
 
     def said(self, bits: int) -> Flags:
-        """Frames of which a reason is one of these; a refused one has those of the frame before."""
+        """Returns frames with one of these reasons; a refused one has those of the frame before."""
         return np.asarray(((self.reasons & bits) != 0) & (self.column("status") == 0))
 
     @property
     def shared(self) -> Counts:
-        """How many points of each frame stood in the frame before."""
+        """Returns how many points of each frame were in the frame before."""
         return self._from_before[:, 0].astype(np.int64)
 
     @property
     def repeated(self) -> Counts:
-        """How many of these have the very pixels that they had there."""
+        """Returns how many of these have identical pixels there."""
         return self._from_before[:, 1].astype(np.int64)
 
     @property
     def flow_px(self) -> Floats:
-        """Median way of the shared points in the left picture; NaN where they are few."""
+        """Returns the shared points' median motion in the left picture; NaN where they are few."""
         return self._from_before[:, 2]
 
     @cached_property
     def _from_before(self) -> Floats:
-        """(n, 3): the three of these; the points themselves are many, and not kept."""
+        """Returns (n, 3) the three columns above; the points themselves are many, and not kept."""
         out = np.tile([0.0, 0.0, np.nan], (len(self.frames), 1))
         for k, (before, now) in enumerate(pairwise(self.frames), 1):
             first, second = before.pixels, now.pixels
@@ -109,21 +109,21 @@ class Log:
 
 
 def _moved(first: Pixels, second: Pixels) -> tuple[int, float]:
-    """How many have not at all, and the median way of the others and these."""
+    """Returns how many points are identical, and the median motion of all."""
     repeated = int((first == second).all(axis=1).sum())
     way = (second.astype(np.float64) - first)[:, :2]
     way = way[np.isfinite(way).all(axis=1)]
     return repeated, float(np.median(np.hypot(*way.T))) if len(way) >= FEW else np.nan
 
 
-def log_of(messages: Sequence[Message]) -> Log:
-    """PelorusError where no frame was answered."""
+def log_of(messages: Sequence[Message]) -> FilterLog:
+    """Reads a log; raises PelorusError where no frame was answered."""
     frames, reports, poses, evidence = _answers(messages)
     answered = [k for k, report in enumerate(reports) if report is not None]
     if not answered:
         raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
     behind, stamps, readings = _readings(messages)
-    return Log(
+    return FilterLog(
         header_of_messages(messages),
         [frames[k] for k in answered],
         [report for report in reports if report is not None],
@@ -146,8 +146,10 @@ def log_of(messages: Sequence[Message]) -> Log:
 def _answers(
     messages: Sequence[Message],
 ) -> tuple[list[Stereo], list[Report | None], list[Pose | None], list[Evidence | None]]:
-    """All frames, and what answers each. A robot's answer comes when it is ready, so it is known by
-    its time; a pose stands before the report, evidence behind it.
+    """Returns all frames with their answers.
+
+    A robot's answer comes late, and is matched by its time; a pose comes before its report,
+    evidence after it.
     """
     frames = [m for m in messages if isinstance(m, Stereo)]
     reports: list[Report | None] = [None] * len(frames)
@@ -177,8 +179,10 @@ def _answers(
 
 
 def _readings(messages: Sequence[Message]) -> tuple[Times, Times, Floats]:
-    """For each frame the newest stamp before it; stamps and readings that a filter may use. What is
-    no number, or none that a sensor gives, was refused: it is no part of the motion.
+    """Returns for each frame the newest stamp before it, and stamps and values of the valid
+    readings.
+
+    Readings that are not finite, or out of any sensor's range, were refused and are left out.
     """
     by_imu = any(isinstance(m, Imu) for m in messages)
     behind, stamps, numbers = array("q"), array("q"), array("d")
@@ -203,8 +207,8 @@ def _sigma(messages: Sequence[Message], *names: str) -> Floats:
     return np.repeat([in_force(messages, name) or 0.0 for name in names], 3)
 
 
-def suspect(log: Log) -> Flags:
-    """Frames that the supervisor or the gate found odd."""
+def suspect(log: FilterLog) -> Flags:
+    """Returns the frames that the supervisor or the gate found suspect."""
     flags = np.array([0 if e is None else e.flags for e in log.evidence], np.int64)
     matched, gated = log.column("matched"), log.column("gated")
     rejected = (matched >= FEW) & (2 * gated > matched)
@@ -212,12 +216,12 @@ def suspect(log: Log) -> Flags:
 
 
 def period(t_ns: Times) -> float:
-    """What mostly lies between two, ns."""
+    """Returns the median interval, ns."""
     return float(np.median(np.abs(np.diff(t_ns)))) if len(t_ns) > 1 else 0.0
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:
-    """First and last index of each stretch of yes."""
+    """Returns first and last index of each stretch of True."""
     edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
     return list(
         zip(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong all along: settings that do not fit, a front end that loses its tracks.
+"""Finds what is wrong throughout: settings that do not fit, a front end that loses its tracks.
 
-It is no event: nothing happened. But a filter whose sigmas are wrong rejects, doubts and locks, and
-who reads its log must know that first.
+It is no event. But a filter whose sigmas are wrong rejects, doubts and locks, and the reader of its
+log must know that first.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pelorus.explain.inputs import is_habit, losses
-from pelorus.explain.log import NO_READING, Flags, Log, period
+from pelorus.explain.log import NO_READING, FilterLog, Flags, period
 from pelorus.schema import STATUSES, number
 
 MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
@@ -20,16 +20,16 @@ MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
     for name in ("NOISE_MISFIT", "BIAS_OFF_PRIOR", "TWIST_CONTRADICTED", "NO_TWISTS")
 )
 LATE = number("status", "LATE")
-GATED_MOST = 0.2  # of the matches: as sigmas say, the gate rejects one of a hundred
-FRAMES_LEAST = 20  # to say so of
+GATED_MOST = 0.2  # of the matches: with right sigmas the gate rejects one of a hundred
+FRAMES_LEAST = 20  # for such a remark
 ALL_ALONG = 0.5  # of the frames
-DOMINATES = 2.0  # of two parts of a vector one is most of it
-PERIODS_LATE = 2.0  # behind a frame; within one its newest reading lies as it comes
+DOMINATES = 2.0  # ratio from which one part of a vector is most of it
+PERIODS_LATE = 2.0  # behind a frame; its newest reading is normally within one
 DIRECTIONS = ("forward", "sideways", "upward", "roll", "pitch", "yaw")
 
 
-def of_setup(log: Log, calm: Flags) -> Iterator[str]:
-    """In words; `calm` are the frames to judge by: those before the first event."""
+def of_setup(log: FilterLog, calm: Flags) -> Iterator[str]:
+    """Yields remarks; `calm` are the frames to judge by: those before the first event."""
     if np.count_nonzero(calm) < FRAMES_LEAST:
         return
     if np.mean(log.column("status")[calm] != 0) > ALL_ALONG:
@@ -46,8 +46,8 @@ def of_setup(log: Log, calm: Flags) -> Iterator[str]:
         yield f"the front end loses all tracks every {whole_s / len(lost):.1f} s, and begins anew"
 
 
-def refusals(log: Log) -> str:
-    """Of frames; empty where there are none."""
+def refusals(log: FilterLog) -> str:
+    """Returns a remark on refused frames; empty where there are none."""
     status = log.column("status")
     refused = status != 0
     if not refused.any():
@@ -64,11 +64,11 @@ def refusals(log: Log) -> str:
     return words + STATUSES.get(-number_of, f"status {-number_of}")
 
 
-def _share(log: Log, bits: int, calm: Flags) -> float:
+def _share(log: FilterLog, bits: int, calm: Flags) -> float:
     return float(log.said(bits)[calm].mean())
 
 
-def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
+def _noise(log: FilterLog, calm: Flags, gate_told: bool) -> Iterator[str]:
     if log.said(MISFIT)[calm].any():
         last = [e for e, c in zip(log.evidence, calm, strict=True) if c and e is not None]
         usual = np.sqrt(last[-1].usual) if last else np.ones(6)
@@ -85,8 +85,8 @@ def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
         )
 
 
-def _bias(log: Log, calm: Flags) -> str:
-    """Of wheels: a wrong scale makes one along the way, a camera that is turned one across it."""
+def _bias(log: FilterLog, calm: Flags) -> str:
+    """Returns a remark on wheels' bias: along the way by a scale, across it by a turned camera."""
     poses = [pose for pose, good in zip(log.poses, calm, strict=True) if good and pose is not None]
     v, b = np.zeros(3), np.zeros(6)
     if poses and len(log.readings) and not log.by_imu and log.bias_sigma.all():
@@ -115,8 +115,8 @@ def _bias(log: Log, calm: Flags) -> str:
     )
 
 
-def _readings(log: Log, calm: Flags) -> str:
-    """Missing, refused, or behind the frames."""
+def _readings(log: FilterLog, calm: Flags) -> str:
+    """Returns a remark on readings that are missing, refused, or behind the frames."""
     name = "IMU readings" if log.by_imu else "twists"
     behind = log.behind_ns[calm & (log.behind_ns != NO_READING)]
     if not len(behind):
@@ -131,13 +131,13 @@ def _readings(log: Log, calm: Flags) -> str:
     return f"{name} are missing, refused or too old all along: {refused}"
 
 
-def gated_share(log: Log, calm: Flags) -> float:
-    """Of all matches."""
+def gated_share(log: FilterLog, calm: Flags) -> float:
+    """Returns the share of all matches that the gate rejected."""
     matched, gated = (int(log.column(name)[calm].sum()) for name in ("matched", "gated"))
     return gated / matched if matched else 0.0
 
 
-def _gate(log: Log, calm: Flags) -> Iterator[str]:
+def _gate(log: FilterLog, calm: Flags) -> Iterator[str]:
     if (share := gated_share(log, calm)) > GATED_MOST:
         yield (
             f"the gate rejects {share:.0%} of the matches: pixel-sigma too small, wrong "

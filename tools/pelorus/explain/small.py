@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Readings of small sensors that contradict what the filter knows: wheels that slip beside an IMU,
-a position that is off.
-"""
+"""Finds readings of small sensors that contradict the filter: slipping wheels, a wrong position."""
 
 from __future__ import annotations
 
@@ -9,20 +7,18 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pelorus.explain.finding import Cause, Finding
-from pelorus.explain.log import Log, runs
+from pelorus.explain.incident import Cause, Incident
+from pelorus.explain.log import FilterLog, runs
 from pelorus.frames import Message, Reading
 from pelorus.schema import SENSORS, number
 from pelorus.small_sensors import name_of
 
 REJECTED = number("reason", "READINGS_REJECTED")
-FRAMES_LEAST = 2  # one is no event
+FRAMES_LEAST = 2  # frames: a single one is no event
 
 
-def of_small(log: Log, messages: Sequence[Message]) -> Iterator[Finding]:
-    """Frames in a row before which readings were rejected; which sensors there were, and how far
-    off wheels read.
-    """
+def of_small(log: FilterLog, messages: Sequence[Message]) -> Iterator[Incident]:
+    """Yields stretches of frames with rejected readings, with sensors and the wheels' error."""
     readings = [m for m in messages if isinstance(m, Reading)]
     for first, last in runs(log.said(REJECTED)):
         begin, end = int(log.t_ns[max(first - 1, 0)]), int(log.t_ns[last])
@@ -31,11 +27,11 @@ def of_small(log: Log, messages: Sequence[Message]) -> Iterator[Finding]:
             continue
         names = ", ".join(sorted({name_of(m.sensor) for m in meanwhile}))
         words = f"readings of {names} are rejected, or off by more than their sigma"
-        yield Finding(Cause.READINGS_OFF, begin, end, words + _rolled(log, meanwhile))
+        yield Incident(Cause.READINGS_OFF, begin, end, words + _rolled(log, meanwhile))
 
 
-def _rolled(log: Log, readings: Sequence[Reading]) -> str:
-    """What wheels say of the speed ahead, and what the filter does."""
+def _rolled(log: FilterLog, readings: Sequence[Reading]) -> str:
+    """Returns the forward speed by wheels and by the filter, in words."""
     ahead = [m for m in readings if m.sensor == SENSORS["wheel"] and m.axes & 1]
     poses = [pose for pose in log.poses if pose is not None]
     if not ahead or not poses:

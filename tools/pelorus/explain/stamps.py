@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong with the clocks: steps, and pauses of a sensor.
+"""Finds faults of the clocks: steps, and pauses of a sensor.
 
-After a gap the pictures tell which of the two it was: while the camera does not see, the body moves
-on, and if the picture has moved no more than it does from frame to frame, no time has passed.
+After a gap the pictures tell them apart: while the camera does not see, the body moves on. If the
+picture has moved no more than from frame to frame, no time has passed.
 """
 
 from __future__ import annotations
@@ -11,28 +11,29 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pelorus.explain.finding import Cause, Finding, S
-from pelorus.explain.log import NO_READING, Log, period
+from pelorus.explain.incident import Cause, Incident, S
+from pelorus.explain.log import NO_READING, FilterLog, period
 from pelorus.layout import Floats
 from pelorus.motion import Times
 
-BEFORE, AFTER = 10, 5  # frames whose median tells how stamps stood, and stand
+BEFORE, AFTER = 10, 5  # frames whose median gives the lead before and after
 MAD = 1.4826  # of a normal distribution: sigma over the median absolute deviation
-JITTER_SIGMAS = 8.0  # by which a stamp's lead does not change by chance
+JITTER_SIGMAS = 8.0  # no chance changes a stamp's lead by more
 
 
-def of_stamps(log: Log) -> Iterator[Finding]:
-    """All of it."""
+def of_stamps(log: FilterLog) -> Iterator[Incident]:
+    """Yields all findings on the clocks."""
     yield from clock_steps(log)
     yield from gaps(log)
     yield from backwards(log)
 
 
-def clock_steps(log: Log) -> Iterator[Finding]:
-    """Frames come between readings as before, and their stamps have moved against the readings'.
+def clock_steps(log: FilterLog) -> Iterator[Incident]:
+    """Yields steps of the frames' stamps against the readings', while they still arrive between
+    these.
 
-    By how much a frame's stamp is ahead of the newest reading varies by a period of the readings,
-    and by what is usual on this log. A step is more, and lasts.
+    The lead of a frame's stamp over the newest reading varies by a period of the readings, and by
+    the log's usual jitter. A step is larger, and lasts.
     """
     known = np.nonzero(log.behind_ns != NO_READING)[0]
     if len(known) < BEFORE:
@@ -45,7 +46,7 @@ def clock_steps(log: Log) -> Iterator[Finding]:
     for k in np.nonzero(np.abs(np.diff(ahead)) > least)[0] + 1:
         before, after = ahead[max(k - BEFORE, 0) : k], ahead[k : k + AFTER]
         if behind[k : k + AFTER][-1] == behind[-1]:
-            continue  # the readings have ended: no frame tells their stamps any more
+            continue  # the readings have ended
         by = float(np.median(after) - np.median(before))
         if abs(by) <= least or np.ptp(before) > abs(by) / 2 or np.ptp(after) > abs(by) / 2:
             continue
@@ -56,42 +57,42 @@ def clock_steps(log: Log) -> Iterator[Finding]:
         words = (
             f"the stamps of the {whose} step {which} by {abs(by) / S:.3f} s against the {others}'"
         )
-        yield Finding(Cause.CLOCK_STEP, at, at, words)
+        yield Incident(Cause.CLOCK_STEP, at, at, words)
 
 
 def _jitter(ahead: Floats) -> float:
-    """Sigma of the lead from frame to frame; a single step does not show in it."""
+    """Returns the sigma of the lead from frame to frame; a single step does not affect it."""
     change = np.diff(ahead)
     return MAD * float(np.median(np.abs(change - np.median(change))))
 
 
-PAUSE_S = 1.0  # after so long without a frame the filter says so
-PERIODS = 10  # that fail: one or two are lost on any bus
-SAME_FLOW = 3.0  # times the picture's way from frame to frame: far less than ten periods make of it
-MOVES_PX = 1.0  # a picture that moves less tells no time
+PAUSE_S = 1.0  # without a frame, after which the filter reports it
+PERIODS = 10  # missing ones: one or two are lost on any bus
+SAME_FLOW = 3.0  # ratio to the picture's motion between frames; ten periods make far more
+MOVES_PX = 1.0  # a smaller motion of the picture shows no time
 
 
-def gaps(log: Log) -> Iterator[Finding]:
-    """No frame, or no reading, for long."""
+def gaps(log: FilterLog) -> Iterator[Incident]:
+    """Yields long gaps without a frame, or without a reading."""
     name = "IMU reading" if log.by_imu else "twist"
     for begin, end, _ in _long(log.reading_ns):
-        if _between(log.t_ns, begin, end):  # where neither came it is told of the frames
+        if _between(log.t_ns, begin, end):  # a gap of both is reported as one of the frames
             words = f"no {name} for {(end - begin) / S:.1f} s"
-            yield Finding(Cause.NO_READINGS, begin, end, words)
+            yield Incident(Cause.NO_READINGS, begin, end, words)
     for begin, end, k in _long(log.t_ns):
         long = f"{(end - begin) / S:.1f} s"
         alone = not _between(log.reading_ns, begin, end)
         if _no_time_passed(log, k):
             whose = "all stamps step" if alone else "the stamps of the frames step"
             words = f"{whose} forward by {long}, and the pictures go on as if no time had passed"
-            yield Finding(Cause.CLOCK_STEP, begin, begin, words)
+            yield Incident(Cause.CLOCK_STEP, begin, begin, words)
             continue
         both = f"neither frames nor {name}s for {long}: a pause, or a step of the clock of both"
-        yield Finding(Cause.NO_FRAMES, begin, end, both if alone else f"no frame for {long}")
+        yield Incident(Cause.NO_FRAMES, begin, end, both if alone else f"no frame for {long}")
 
 
 def _long(t_ns: Times) -> Iterator[tuple[int, int, int]]:
-    """Begin and end of each gap, and the number of what came before it."""
+    """Yields begin and end of each gap, and the number of what came before it."""
     step = np.diff(t_ns)
     for k in np.nonzero(step > max(PAUSE_S * S, PERIODS * period(t_ns)))[0]:
         yield int(t_ns[k]), int(t_ns[k + 1]), int(k)
@@ -101,7 +102,7 @@ def _between(t_ns: Times, begin: int, end: int) -> bool:
     return bool(((t_ns > begin) & (t_ns < end)).any())
 
 
-def _no_time_passed(log: Log, k: int) -> bool:
+def _no_time_passed(log: FilterLog, k: int) -> bool:
     around = np.concatenate(
         (log.flow_px[max(k - BEFORE, 0) : k + 1], log.flow_px[k + 2 : k + BEFORE])
     )
@@ -112,8 +113,8 @@ def _no_time_passed(log: Log, k: int) -> bool:
     return usual > MOVES_PX and bool(log.flow_px[k + 1] < SAME_FLOW * usual)
 
 
-def backwards(log: Log) -> Iterator[Finding]:
-    """Stamps that go back. Of frames against readings it is told as a step."""
+def backwards(log: FilterLog) -> Iterator[Incident]:
+    """Yields stamps that go back. A step of frames against readings is reported by clock_steps."""
     name = "IMU readings" if log.by_imu else "twists"
     streams = [(log.reading_ns, name)]
     if (log.behind_ns == NO_READING).all():
@@ -124,4 +125,4 @@ def backwards(log: Log) -> Iterator[Finding]:
             at = int(t[back[0]])
             by_s = int(t[back[0]] - t[back[0] + 1]) / S
             words = f"the stamps of the {whose} go back by {by_s:.3f} s"
-            yield Finding(Cause.CLOCK_STEP, at, at, words)
+            yield Incident(Cause.CLOCK_STEP, at, at, words)

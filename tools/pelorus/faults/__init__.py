@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Faults of a recording that its own data give away, and their remedies."""
+"""Detects faults of a recording from its own data, and mends some of them."""

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""By how much camera and twists disagree in scale, place and time, and how well that is known.
+"""Estimates how far camera and twists disagree in scale, place and time, with standard errors.
 
-Both tell a turn and a velocity for each pair of frames: twists as they stand (twist_body), an IMU
-but for what each stretch of the drive begins with (imu_body). All that may be wrong is unknown at
-once: a scale is told from a bias by a speed that varies, a lever by turns, a late clock by motions
-that change.
+Both give a turn and a velocity for each pair of frames: twists directly (twist_body), an IMU up to
+the unknown start of each stretch of the drive (imu_body). All unknowns are estimated together: a
+speed that varies separates a scale from a bias, turns show a lever, and changing motion shows a
+clock that is off.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from pelorus.faults.clocks import FRAMES_MIN, UNTOLD, TwoClocks, offset_of, two_clocks
 from pelorus.faults.fit import CLOCK, FOCAL, LEVER, SCALE, TILT, TURN, TURN_SCALE, Body, Fit
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.layout import Floats
@@ -24,49 +24,50 @@ from pelorus.recording import Recording
 from pelorus.tracks import Tracks
 
 NO_BIAS_MPS = 1e-4
-BIAS_MPS = 0.1  # sigma of the velocity's bias, as the filter's setting
-BIAS_MPS2 = 0.3  # and of an accelerometer's, where the HEADER tells none: a cheap one's
-HALVED_MIN = 0.8  # of the frames, to be told by half of their points
-CHANCE = 2.0  # standard errors that near and far may differ by
+BIAS_MPS = 0.1  # m/s, sigma of the velocity's bias, as the filter's setting
+BIAS_MPS2 = 0.3  # m/s^2, of a cheap accelerometer's bias, where the HEADER has none
+HALVED_MIN = 0.8  # share of the frames that must be usable with half of their points
+CHANCE = 2.0  # standard errors by which near and far may differ
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """`scale` 1, `lever_m` 0 and `offset_s` 0 are expected; sigmas stand beside them."""
+    """The disagreement of camera and body: `scale` 1, `lever_m` 0 and `offset_s` 0 are expected."""
 
     frames: int
-    scale: float  # beside a bias
+    scale: float  # with a free bias
     scale_sigma: float
     through_zero: float  # the scale if there is no bias
     through_zero_sigma: float
-    lever_m: Floats  # the camera's place in the body beside the given one
+    lever_m: Floats  # the camera's true place in the body minus the given one
     lever_covariance: Floats
     offset_s: float  # to be added to the frames' times
     offset_sigma_s: float
     speed_mps: float
     turn_scale: float  # 1 is expected
     turn_scale_sigma: float
-    focal: float = 1.0  # times the given one, by an IMU; 1 is expected
+    focal: float = 1.0  # factor of the given one, by an IMU; 1 is expected
     focal_sigma: float = float("inf")
-    tilt_rad: Floats | None = None  # of the camera in the body's axes, beside the given; by twists
+    # of the camera in the body's axes, against the given rotation; by twists
+    tilt_rad: Floats | None = None
     tilt_covariance: Floats | None = None
-    clocks: TwoClocks = UNTOLD  # of velocities and turns, each by itself; not of an IMU
+    clocks: TwoClocks = UNTOLD  # of velocities and of turns separately; none for an IMU
 
     @property
-    def told(self) -> bool:
+    def is_known(self) -> bool:
         return self.frames >= FRAMES_MIN
 
 
-def halved(recording: Recording, seen: Seen, lag: int) -> Seen:
-    """With halves of the points, where they tell of enough of the frames."""
+def halved(recording: Recording, seen: CameraMotion, lag: int) -> CameraMotion:
+    """Returns `seen` with estimates from halves of the points, where these give enough frames."""
     return seen.with_halves(recording, lag, int(HALVED_MIN * seen.usable.sum()))
 
 
-def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -> Agreement:
-    """Of a recording whose extrinsic's rotation and whose units are right; `seen` of the views, if
-    that is told already.
+def agreement(recording: Recording, views: TwoViews, seen: CameraMotion | None = None) -> Agreement:
+    """Fits scale, lever and clock; assumes that rotation and units are right. `seen` is the
+    views' motion, if it is known already.
     """
-    seen = Seen.of(recording, views) if seen is None else seen
+    seen = CameraMotion.of(recording, views) if seen is None else seen
     if seen.usable.sum() < FRAMES_MIN:
         nan = float("nan")
         return Agreement(
@@ -86,12 +87,12 @@ def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -
     at = offset
     own = found or Fit(body.design(recording, seen, at, bias))
     clock_sigma = own.known(CLOCK) if clock_told else float("inf")
-    if clocks.apart:  # all else is asked of motions that belong together
+    if clocks.apart:  # only motions of the same time are compared
         body, at, found = TwistBody(recording, clocks.turns_late_s), clocks.ways_s, None
     if found is None:
         found = Fit(body.design(recording, seen, at, bias))
     none = place = found
-    turns_told = by_imu or found.tells(TURN_SCALE)
+    turns_known = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
         late = clocks.turns_late_s if clocks.apart else None
         place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
@@ -99,7 +100,7 @@ def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -
     speed = float(np.median(np.linalg.norm(found.g, axis=1))) + 1e-12
     scale, sigma = float(found.x[SCALE]), _sigma(found, by_imu)
     by_prior = float(np.hypot(none.known(SCALE), bias / speed))
-    if not by_imu and sigma > by_prior:  # then the bias is what is known of it beforehand
+    if not by_imu and sigma > by_prior:  # then the prior of the bias is used
         scale, sigma = float(none.x[SCALE]), by_prior
     doubt = _doubt(recording, views, body, (at, bias if by_imu else NO_BIAS_MPS), none)
     lever = slice(LEVER, LEVER + 3)
@@ -116,7 +117,7 @@ def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -
         clock_sigma,
         speed,
         1 + float(found.x[TURN_SCALE]),
-        found.known(TURN_SCALE) if turns_told else float("inf"),
+        found.known(TURN_SCALE) if turns_known else float("inf"),
         1 - float(found.x[FOCAL]),
         found.known(FOCAL) if by_imu else float("inf"),
         tilt_rad=tilt[0],
@@ -126,8 +127,10 @@ def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -
 
 
 def _tilt(fit: Fit) -> tuple[Floats, Floats]:
-    """What velocities and rates of turn say of it together, each as well as it knows. The one may
-    be a bias across the way, the other knows nothing of what is along the axis of the turns.
+    """Returns the camera's tilt (3,), rad, from velocities and rates of turn, and its covariance.
+
+    Velocities may have a bias across the way; rates show nothing about the axis of the turns. Each
+    counts with its own covariance.
     """
     both = [*range(TILT, TILT + 3), *range(TURN, TURN + 3)]
     known = np.linalg.inv(fit.covariance[np.ix_(both, both)])
@@ -137,14 +140,16 @@ def _tilt(fit: Fit) -> tuple[Floats, Floats]:
 
 
 def _sigma(fit: Fit, by_imu: bool) -> float:
-    """Of the scale. With an IMU blocks are shorter than the stretches that share unknowns, and tell
-    too little; but the readings' own noise is small, and what the images add is known.
+    """Returns the standard error of the scale.
+
+    With an IMU the blocks are shorter than the stretches that share unknowns, and give too small an
+    error; but the readings' own noise is small, and what the images add is known.
     """
     return max(fit.known(SCALE), fit.image_sigma[SCALE]) if by_imu else fit.known(SCALE)
 
 
-def _body(recording: Recording, seen: Seen) -> tuple[Body, float]:
-    """What moves the body, and the sigma of its bias."""
+def _body(recording: Recording, seen: CameraMotion) -> tuple[Body, float]:
+    """Returns the model of the body's motion, and the sigma of its bias."""
     noise = recording.header.noise
     if len(recording.inertial.t_ns):
         told = noise.bias_accel_sigma
@@ -156,7 +161,7 @@ def _body(recording: Recording, seen: Seen) -> tuple[Body, float]:
 def _doubt(
     recording: Recording, views: TwoViews, body: Body, at: tuple[float, float], fit: Fit
 ) -> float:
-    """About the scale, beyond its standard error."""
+    """Returns the uncertainty of the scale beyond its standard error."""
     near_and_far = _doubt_by_depth(recording, views, body, at)
     return float(np.hypot(near_and_far, _doubt_by_noise(recording, views, body, at, fit)))
 
@@ -164,14 +169,15 @@ def _doubt(
 def _doubt_by_depth(
     recording: Recording, views: TwoViews, body: Body, at: tuple[float, float]
 ) -> float:
-    """How far near and far points are from agreeing on one scale, beyond what noise makes: as much
-    doubt there is about it. A disparity that is off, or a tracker that lags, shows so. `at`: the
-    clock's offset, and the sigma of a bias.
+    """Returns by how much the scales of near and far points differ beyond noise.
+
+    An offset of the disparity, or a tracker that lags, shows in it. `at`: the clock's offset, s,
+    and the sigma of a bias.
     """
     halves = []
     for tracks in by_depth(recording.tracks):
         part = replace(recording, tracks=tracks)
-        seen = Seen.of(part, two_views(tracks, recording.header.camera, views.lag))
+        seen = CameraMotion.of(part, two_views(tracks, recording.header.camera, views.lag))
         if seen.usable.sum() < FRAMES_MIN:
             return 0.0
         fit = Fit(body.design(part, seen, *at))
@@ -184,15 +190,18 @@ def _doubt_by_depth(
 def _doubt_by_noise(
     recording: Recording, views: TwoViews, body: Body, at: tuple[float, float], fit: Fit
 ) -> float:
-    """How much another scale pixels of twice the variance show, beyond what chance makes: of points
-    whose disparity is hardly more than its noise every way comes out too short. The noise that is
-    there has changed it by as much if that grows with its square, by a third if with its fourth
-    power (Cook and Stefanski 1994): half is one sigma. `at` as beside, `fit` of what is there.
+    """Returns the bias of the scale by pixel noise, one sigma.
+
+    The scale is estimated again with pixel noise of twice the variance: where disparities are
+    hardly larger than their noise every way comes out too short. The noise that is there has
+    changed the scale by as much if the effect grows with its square, and by a third if with its
+    fourth power (Cook and Stefanski 1994); half is one sigma. `at` is as in _doubt_by_depth, `fit`
+    that of the data.
     """
     tracks = recording.tracks
     more = np.random.default_rng(1).normal(0, views.sigma_px, tracks.pixels.shape)
     noisy = replace(recording, tracks=replace(tracks, pixels=tracks.pixels + more))
-    seen = Seen.of(noisy, two_views(noisy.tracks, recording.header.camera, views.lag))
+    seen = CameraMotion.of(noisy, two_views(noisy.tracks, recording.header.camera, views.lag))
     if seen.usable.sum() < FRAMES_MIN:
         return 0.0
     if len(recording.inertial.t_ns):
@@ -204,7 +213,7 @@ def _doubt_by_noise(
 
 
 def by_depth(tracks: Tracks) -> tuple[Tracks, Tracks]:
-    """The near and the far half of the points, each point as a whole."""
+    """Returns the near and the far half of the points, each point whole."""
     disparity = tracks.pixels[:, 0] - tracks.pixels[:, 2]
     _, number = np.unique(tracks.id, return_inverse=True)
     mean = np.bincount(number, disparity) / np.bincount(number)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much lever, scale and clock are off, put into words where it is beyond doubt and matters."""
+"""Reports lever, scale and clock in words where they are significantly off and it matters."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
-# Where the HEADER tells no bias. With the filter's own default, which is smaller, 7 of 38 good
+# Used where the HEADER has no bias. With the filter's own default, which is smaller, 7 of 38 good
 # drives with biases of 0.01 and 0.03 m/s would be called faulty.
 BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0
-SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
+SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is none
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
-LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
+LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of the likelihood ratio
 PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
-PLACE_TOLD_M = 10.0  # sigma above which a place is not told
-LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
-# A turning car goes sideways by this times v^2 w: so far off its camera seems to be.
+PLACE_TOLD_M = 10.0  # sigma above which a place is not reported
+LEVER_SHARE = 0.05  # relative sigma of the place as it was measured
+# A turning car slips sideways by this times v^2 w, and its camera seems to be elsewhere.
 SLIP_S2_PER_M = 0.003
 
 
 def bias_mps(recording: Recording) -> float:
-    """Sigma of the velocity's bias."""
+    """Returns the sigma of the velocity's bias, m/s."""
     told = recording.header.noise.bias_velocity_sigma_mps
     return told if told >= 0 else BIAS_MPS
 
 
 def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """Is the camera rather where a translation that was mistaken for another one puts it?"""
+    """Yields a fault if the extrinsic's translation seems to be of the opposite convention."""
     T = recording.T_CB
     arm = -T.R.T @ T.p
     known = np.linalg.inv(place_covariance(recording, agreed))
@@ -49,7 +49,7 @@ def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
         left = agreed.lever_m - apart
         off = float(left @ known @ left)
         gain = as_given - off
-        if off > PLACE_SURE:  # it is elsewhere
+        if off > PLACE_SURE:  # neither convention explains the place
             continue
         if float(np.sqrt(apart @ known @ apart)) > LEVER_APART and gain > max(best, LEVER_SURE):
             best, likely = gain, words
@@ -63,8 +63,10 @@ def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
 
 
 def place_covariance(recording: Recording, agreed: Agreement) -> Floats:
-    """How well the camera's place is known: by turns, by him who measured it, and along the way of
-    twists as far as tyres slip, of which these know nothing.
+    """Returns the covariance of the camera's place, m^2.
+
+    It covers the turns, the accuracy of a measured place, and for twists the slip of tyres along
+    the way, which twists do not show.
     """
     doubt = LEVER_SHARE * float(np.linalg.norm(recording.T_CB.p)) + 0.01
     known = np.asarray(agreed.lever_covariance + doubt**2 * np.eye(3))
@@ -77,8 +79,10 @@ def place_covariance(recording: Recording, agreed: Agreement) -> Floats:
 
 
 def of_place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """Is the camera where it is said to be? An IMU measures where it is; twists may be of another
-    point of the robot than the one from which the extrinsic counts.
+    """Yields a fault if the camera is not where the extrinsic puts it.
+
+    An IMU measures where it is itself; twists may be those of another point of the robot than the
+    extrinsic's body.
     """
     T = recording.T_CB
     arm = -T.R.T @ T.p
@@ -105,20 +109,22 @@ def of_place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
 
 
 def _metres(p: Floats, told: NDArray[np.bool_] | None = None) -> str:
-    """A place; ? for what of it is not told."""
+    """Returns a place in words, with ? for components that are unknown."""
     known = np.ones(3, bool) if told is None else told
     return f"at ({', '.join(f'{x:.2f}' if k else '?' for x, k in zip(p, known, strict=True))}) m"
 
 
 def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
-    """`bias_sigma` as the HEADER tells it, or else as the filter's settings allow it: where the
-    speed varies too little to tell a scale from a bias, one of that size is nothing new.
+    """Yields a fault if the scale is off.
+
+    `bias_sigma` comes from the HEADER, or from the filter's settings: where the speed varies too
+    little to separate scale and bias, a bias of that size explains the scale.
     """
     off, sigma = agreed.scale - 1, agreed.scale_sigma
     turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
     through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
     if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_WILD) and agreed.scale < SCALE_KNOWN * sigma:
-        if abs(through) > SCALE_WILD:  # else the speed hardly varies, and what it does is chance
+        if abs(through) > SCALE_WILD:  # else the speed hardly varies, and the scale is chance
             yield Fault(
                 "no-fit",
                 "camera and twists do not tell the same motion: the images show "
@@ -166,7 +172,7 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
 
 
 def of_scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
-    """Turns tell the focal length, forces the baseline; the gyro's scale is the rest."""
+    """Yields faults of scale by an IMU: of the focal length, the baseline or the gyro."""
     way = f"the images show {agreed.scale:.3f} +- {agreed.scale_sigma:.3f} times the IMU's way"
     for off, sigma, words in (
         (
@@ -194,8 +200,10 @@ def of_scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
 
 
 def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """One reading later or earlier is another timing: what of it a timing explains is said. Where
-    the rates of turn have a clock of their own, the frames are held to the velocities'.
+    """Yields a fault if the clock is off.
+
+    An offset of one reading is another timing of the twists, which is then named. Where the rates
+    of turn have a clock of their own, the frames are compared with the velocities'.
     """
     own = agreed.clocks
     apart = own.apart
@@ -227,7 +235,7 @@ def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
 
 
 def _or_turns(agreed: Agreement) -> str:
-    """Whether a gyro that is late by itself would explain as much."""
+    """Returns a remark if a gyro that is late alone would explain as much."""
     own = agreed.clocks
     sure = abs(own.ways_s) > CLOCK_SIGMAS * own.ways_sigma_s
     if sure or own.apart:
@@ -236,7 +244,7 @@ def _or_turns(agreed: Agreement) -> str:
 
 
 def _timing(recording: Recording, offset: float) -> str:
-    """What of an offset another timing of the twists would explain."""
+    """Returns a remark on the part of an offset that another timing of the twists would explain."""
     period = float(np.median(np.diff(recording.twist_t_ns))) * 1e-9
     given = recording.header.twist_timing
     lates = {TwistTiming.START: 0.0, TwistTiming.MID: 0.5 * period, TwistTiming.END: period}

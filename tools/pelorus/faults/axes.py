@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Axes: the twists are in other body axes than the extrinsic.
+"""Detects twists in other body axes than the extrinsic's.
 
-Shown by: points carried through the twists' motion come out far from their tracks, and far less
-so when the body axes of the extrinsic are permuted or turned. All 24 right-handed choices
-compete, so nothing need be known about the convention. Remedy: T_CB diag(F, 1).
+Points that are carried along by the twists' motion land far from their tracks, and much nearer when
+the extrinsic's body axes are permuted or turned. All 24 right-handed choices compete, so no
+convention is assumed. Remedy: T_CB diag(F, 1).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from pelorus import se3
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
-from pelorus.faults.likelihood import told
+from pelorus.faults.likelihood import with_ratio
 from pelorus.frames import BodyAxes
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -24,8 +24,8 @@ from pelorus.visual_motion import SeenPairs, seen_pairs
 
 SUBJECT = "body axes"
 LAG = 5
-RATIO_MAX = 0.6  # the error must fall below this share of the given one
-SHARE_MIN = 0.75  # in at least so many frames
+RATIO_MAX = 0.6  # least improvement: the error falls to this share of the given one
+SHARE_MIN = 0.75  # share of the frames in which it must fall
 Z_MIN = 3.0  # and with this significance
 
 LETTERS = (("forward", "backward"), ("left", "right"), ("up", "down"))
@@ -33,7 +33,7 @@ FORWARD_LEFT_UP_IN_CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 
 
 
 def ways() -> list[Floats]:
-    """The 48 matrices that permute axes and turn them round; identity first."""
+    """Returns the 48 matrices that permute axes and change their signs; identity first."""
     found: list[Floats] = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
@@ -44,12 +44,12 @@ def ways() -> list[Floats]:
 
 
 def turns() -> list[Floats]:
-    """The 24 of them that are rotations."""
+    """Returns the 24 of them that are rotations."""
     return [F for F in ways() if np.linalg.det(F) > 0]
 
 
 def mend(recording: Recording) -> tuple[Recording, Finding]:
-    """Turn the body axes of the extrinsic if the data say so loudly."""
+    """Turns the body axes of the extrinsic if the data clearly show that it is needed."""
     seen = seen_pairs(recording.tracks, recording.header.camera, LAG)
     candidates = turns()
     errors = [_errors(recording, seen, F) for F in candidates]
@@ -57,7 +57,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     best = int(np.argmin(scores))
     result = duel(errors[0], errors[best], LAG)
     if not result.frames:
-        return recording, Finding(SUBJECT, False, TOO_FEW, "left as given", told=False)
+        return recording, Finding(SUBJECT, False, TOO_FEW, "left as given", is_conclusive=False)
     if best == 0 or not result.clearly_won(RATIO_MAX, SHARE_MIN, Z_MIN):
         return recording, Finding(SUBJECT, False, _quiet(scores), "nothing to mend")
     mended = _turned(recording.T_CB, candidates[best])
@@ -65,7 +65,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"lag-{LAG} reprojection falls from {result.given:.1f} to {result.challenger:.1f} px with "
         f"the axes turned, in {100 * result.share:.0f} % of {result.frames} frames"
     )
-    evidence = told(evidence, result.ratio)
+    evidence = with_ratio(evidence, result.ratio)
     action = f"T_CB turned by {_text(candidates[best])}: body axes are now {name(mended.R)}"
     return recording.with_extrinsic(mended), Finding(SUBJECT, True, evidence, action)
 
@@ -95,7 +95,7 @@ def _text(F: Floats) -> str:
 
 
 def name(R_CB: Floats) -> str:
-    """The body axes in words, for a camera that looks forward."""
+    """Returns the body axes in words, for a camera that looks forward."""
     R = se3.nearest_rotation(R_CB)
     in_camera = FORWARD_LEFT_UP_IN_CAMERA.T @ R  # columns: body axes in forward, left, up
     words = []
@@ -106,7 +106,7 @@ def name(R_CB: Floats) -> str:
 
 
 def body_axes(R_CB: Floats) -> BodyAxes:
-    """HEADER's name of the body axes, for a camera that looks forward."""
+    """Returns the HEADER's name of the body axes, for a camera that looks forward."""
     return {
         "forward-left-up": BodyAxes.FORWARD_LEFT_UP,
         "forward-right-down": BodyAxes.FORWARD_RIGHT_DOWN,

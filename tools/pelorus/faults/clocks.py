@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""When the frames were taken by the body's clock, and whether velocities and rates of turn have one
-clock: a gyro's filter, or its driver, may hold them back while the wheels' velocities are on time.
+"""Finds the offset of the frames to the body's clock, and whether velocities and rates share one.
 
-Offsets are compared by how far the motions go together, and not by how little is left between them:
-between two readings a mean of both is taken, whose noise is smaller, and less would be left there
-whatever the clock.
+A gyro's filter, or its driver, may delay the rates while the wheels' velocities are on time.
+Offsets are compared by the correlation of the motions, not by residuals: between two readings both
+are averaged, which has less noise, and would give smaller residuals there at any clock.
 """
 
 from __future__ import annotations
@@ -15,23 +14,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from pelorus.faults.fit import CLOCK, TURN_CLOCK, Body, Fit
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 FRAMES_MIN = 50
-OFFSETS_S = np.arange(-20, 21) * 0.02  # where the clock's offset is looked for at first
+OFFSETS_S = np.arange(-20, 21) * 0.02  # where the search for the offset starts
 ROUNDS, STEP_S, FOUND_S = 10, 0.05, 2e-4
 APART_SIGMAS, APART_S = 6.0, 0.03
-# Below, a clock of the turns' own is not followed: it may be chance, and where velocities hardly
-# vary each step finds a little of the same chance again.
+# Sigmas below which a clock of the rates' own is not followed: it may be chance, and where
+# velocities hardly vary each step would add a little of the same chance.
 WORTH_SIGMAS = 4.0
 
 
 @dataclass(frozen=True)
 class TwoClocks:
-    """Seconds by which the frames are behind the velocities, and these behind the turns' rates."""
+    """Delay of frames behind velocities, and of velocities behind rates of turn, s."""
 
     ways_s: float = 0.0
     ways_sigma_s: float = float("inf")
@@ -40,15 +39,15 @@ class TwoClocks:
 
     @property
     def apart(self) -> bool:
-        """Whether there are two of them, beyond doubt."""
+        """Returns whether velocities and rates significantly have two clocks."""
         return abs(self.turns_late_s) > max(APART_SIGMAS * self.turns_late_sigma_s, APART_S)
 
 
 UNTOLD = TwoClocks()
 
 
-def offset_of(recording: Recording, body: Body, seen: Seen, bias: float) -> float:
-    """Of the one clock, from where it should be and from where the turns go together most."""
+def offset_of(recording: Recording, body: Body, seen: CameraMotion, bias: float) -> float:
+    """Returns the frames' offset, s, fitted from zero and from the greatest correlation."""
     together = _together(recording, body, seen)
     likely = max((float(x) for x in OFFSETS_S), key=lambda x: (together(x), -abs(x)))
     ends = []
@@ -64,8 +63,8 @@ def offset_of(recording: Recording, body: Body, seen: Seen, bias: float) -> floa
     return max(ends)[1]
 
 
-def two_clocks(recording: Recording, seen: Seen, offset_s: float, bias: float) -> TwoClocks:
-    """Of velocities and of rates of turn, each by itself, from that of both."""
+def two_clocks(recording: Recording, seen: CameraMotion, offset_s: float, bias: float) -> TwoClocks:
+    """Fits the clocks of velocities and of rates separately, from their common one."""
     ways_s, late_s = offset_s, 0.0
     for _ in range(ROUNDS):
         fit = Fit(TwistBody(recording, late_s).design(recording, seen, ways_s, bias))
@@ -88,8 +87,8 @@ def _step(fit: Fit, which: int) -> float:
     return float(np.clip(fit.x[which], -STEP_S, STEP_S))
 
 
-def _together(recording: Recording, body: Body, seen: Seen) -> Callable[[float], float]:
-    """How far the turns of both go together, by the offset."""
+def _together(recording: Recording, body: Body, seen: CameraMotion) -> Callable[[float], float]:
+    """Returns a function that correlates the turns of camera and body at an offset, s."""
     own = seen.rates[:, 3:]
 
     def together(offset_s: float) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which of two hypotheses explains the frames better: robust statistics of their errors."""
+"""Compares two hypotheses by how well they explain the frames, with robust statistics."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ TOO_FEW = "too few common tracks to judge"
 
 @dataclass(frozen=True)
 class Duel:
-    """Medians over frames of both errors, and in how many frames the challenger's is smaller."""
+    """Medians of both errors over frames, and in how many frames the challenger's is smaller."""
 
     frames: int
     given: float
     challenger: float
     wins: int
-    independent: int  # frames / lag: overlapping windows are no independent witnesses
+    independent: int  # frames / lag, for windows overlap
 
     @property
     def share(self) -> float:
@@ -29,12 +29,12 @@ class Duel:
 
     @property
     def z(self) -> float:
-        """Sign test: standard deviations by which the wins exceed a coin's."""
+        """Returns the sign test's z: by how many standard deviations the wins exceed a coin's."""
         return 2.0 * (self.share - 0.5) * float(np.sqrt(self.independent))
 
     @property
     def ratio(self) -> float:
-        """2 ln of the likelihood of so many wins beside that of a coin's."""
+        """Returns 2 ln of the likelihood ratio of so many wins against a coin."""
         return of_share(self.share, self.independent, 0.5)
 
     def clearly_won(self, ratio: float, share: float, z: float) -> bool:
@@ -42,7 +42,7 @@ class Duel:
 
 
 def duel(given: Floats, challenger: Floats, lag: int) -> Duel:
-    """Errors of the same frames under either hypothesis; frames without both are left out."""
+    """Compares errors of the same frames under both hypotheses; both must have them."""
     both = np.isfinite(given) & np.isfinite(challenger)
     frames = int(both.sum())
     if not frames:

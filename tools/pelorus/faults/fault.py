@@ -1,31 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""A fault of a recording, by name."""
+"""A named fault of a recording."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pelorus.faults.likelihood import told
+from pelorus.faults.likelihood import with_ratio
 
 UNTOLD = "untold"  # no fault, but not called good either
 
 
 @dataclass(frozen=True)
 class Fault:
-    """`name` is for programs, `words` for people; nothing was mended."""
+    """A fault: `name` is for programs, `words` are for people; nothing was mended."""
 
     name: str
     words: str
     stops: bool = True  # settings tuned in spite of it would be worth nothing
-    grave: bool = True  # it spoils the result; else the filter can live with it
-    ratio: float | None = None  # 2 ln of its likelihood beside that of no fault
+    grave: bool = True  # it spoils the result; otherwise the filter copes
+    ratio: float | None = None  # 2 ln of the likelihood ratio with and without it
 
     @property
-    def told(self) -> str:
-        """The words, and how much likelier what is seen is with the fault than without."""
-        return told(self.words, self.ratio)
+    def sentence(self) -> str:
+        """Returns the words, with the likelihood ratio of the fault against none."""
+        return with_ratio(self.words, self.ratio)
 
     @property
     def lasts(self) -> bool:
-        """Is it off alike for longer than a step? Not gaps and order; and a clock can be set."""
+        """Returns whether the error lasts longer than a step; gaps, order, clocks do not count."""
         return self.name not in ("clock", UNTOLD) and not self.name.startswith("time-")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a detector says: the verdict, the numbers behind it, and what was done."""
+"""The result of one examination: the verdict, the numbers behind it, and what was done."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Finding:
-    """One examination."""
+    """The result of one examination."""
 
     subject: str  # what was examined
-    found: bool  # whether it is faulty, as far as the data can tell
+    found: bool  # whether it is faulty, as far as the data show
     evidence: str  # the numbers
     action: str  # what was done, or why nothing
-    told: bool = True  # whether there was enough to judge by
+    is_conclusive: bool = True  # whether there was enough to judge by
     measured: bool = False  # no fault: something was measured, and written

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Robust least squares over pairs of frames, whose standard errors are those of whole blocks of the
-drive: they need no model of the noise, and hold when it is not white.
+"""Robust least squares over pairs of frames, with standard errors from blocks of the drive.
+
+They need no model of the noise, and hold when it is not white.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.tracks import Indices
@@ -22,22 +23,25 @@ BLOCKS_LEAST, BLOCKS_MOST, BLOCK_FRAMES = 8, 60, 5
 SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10, 11, 14, 17, 18
 TURN_CLOCK = 19
 PARAMETERS = 20
-NEIGHBOURS = 0.5  # weight of what neighbouring blocks have in common
-# Of an instrument: below, nothing is told (Stock and Yogo 2005: F of 10); above, standard errors
-# are those of strong ones (Lee, McCrary, Moreira and Porter 2022: F of 104)
+NEIGHBOURS = 0.5  # weight of the covariance between neighbouring blocks
+# Of an instrument, standard errors. Below the first nothing is estimated (Stock and Yogo 2005: F of
+# 10); above the second usual standard errors hold (Lee, McCrary, Moreira and Porter 2022: F of
+# 104).
 TELLS_SIGMAS, STRONG = 3.0, 10.0
 SURE = 4.0  # standard errors
-WITHIN = (0.01, 0.99)  # of a column, where its instrument stays: pictures that hang tell leaps
-UNTOLD = 1e6  # variance of what nothing is told of
-PIECE_FRAMES = 20  # longer than what instruments have in common with their neighbours
-RIDGE = 1e-9  # of instruments that say the same
+# quantiles of a column that bound its instrument: frozen pictures make it leap
+WITHIN = (0.01, 0.99)
+UNTOLD = 1e6  # variance of what cannot be estimated
+PIECE_FRAMES = 20  # longer than the instruments' noise is correlated
+RIDGE = 1e-9  # for instruments that are linearly dependent
 
 
 @dataclass(frozen=True)
 class Design:
-    """y = X x + noise by pairs of frames, (k, 6): v and w. `Z` are instruments: X but for what
-    shares the noise of y, and more of them behind. `g` is the camera's velocity as the body has it,
-    `at` ascends with time.
+    """The linear model y = X x + noise over pairs of frames.
+
+    `y` is (k, 6), v and w. `Z` are the instruments: X without what shares the noise of y, and
+    further ones behind. `g` is the camera's velocity by the body's motion, `at` is ascending time.
     """
 
     y: Floats
@@ -50,7 +54,7 @@ class Design:
 
 
 def joined(*parts: Design) -> Design:
-    """Rows of all in the order of time, with instruments that stay where their columns do."""
+    """Returns the rows of all designs in the order of time."""
     order = np.argsort(np.concatenate([part.at for part in parts]), kind="stable")
     names = ("y", "X", "Z", "variance", "g", "at")
     rows = {n: np.concatenate([getattr(part, n) for part in parts])[order] for n in names}
@@ -58,22 +62,29 @@ def joined(*parts: Design) -> Design:
 
 
 class Body(Protocol):
-    """What twists or an IMU say of the motion between frames."""
+    """The motion between frames by twists or an IMU."""
 
     def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
-        """(k, 3) w on average from each frame to the next, if these were later by so much. NaN
-        where nothing is known.
+        """Returns (k, 3) the mean rates from each frame to the next, rad/s, with frames `offset_s`
+        later.
+
+        NaN where nothing is known.
         """
 
-    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
-        """Of the pairs that can be used; `bias` is the sigma of what the velocity, or the specific
-        force, is off by.
+    def design(
+        self, recording: Recording, seen: CameraMotion, offset_s: float, bias: float
+    ) -> Design:
+        """Returns the design of the usable pairs.
+
+        `bias` is the sigma of the velocity's bias, m/s, or of the specific force's, m/s^2.
         """
 
 
 class Fit:
-    """All unknowns of a design, by two-stage least squares: of each column of X counts what the
-    instruments tell of it. Where they tell nothing, what is known beforehand stands, and its sigma.
+    """All unknowns of a design, by two-stage least squares.
+
+    Of each column of X counts the part that the instruments explain. Where they explain nothing,
+    the prior and its sigma stand.
     """
 
     def __init__(self, design: Design, blocks_most: int = BLOCKS_MOST) -> None:
@@ -105,15 +116,17 @@ class Fit:
         self._known = inverse @ prior @ inverse.T
         self.covariance = self.covariance_of(left) + self._known
         self.sigma = np.sqrt(np.diagonal(self.covariance))
-        shared = variance / (variance + extra)  # of the variance what the images add
+        shared = variance / (variance + extra)  # share of the variance that the images add
         of_all = self._Z.reshape(-1, self._Z.shape[2])
         middle = (of_all * (trust * shared).reshape(-1, 1)).T @ of_all
         images = inverse @ middle @ inverse.T
         self.image_sigma = np.sqrt(np.maximum(np.diagonal(images), 0.0))
 
     def covariance_of(self, left: Floats) -> Floats:
-        """Of the unknowns, by what residuals (k, a) leave in blocks of the drive, and in neighbours
-        together (Newey and West 1987): what is off for seconds is not new in every block.
+        """Returns the covariance of the unknowns from the residuals `left` (k, a).
+
+        Residuals are summed over blocks of the drive and correlate between neighbours (Newey and
+        West 1987), for errors that last seconds are not new in every row.
         """
         count = len(left)
         score = (self._Z * (left * self._trust)[..., None]).sum(axis=1)
@@ -125,9 +138,11 @@ class Fit:
         return np.asarray(self._inverse @ meat @ self._inverse.T)
 
     def beside(self, which: Sequence[int], values: Floats) -> float:
-        """d^2 of what was found of some unknowns beside these values. What is left with the values
-        has nothing to do with the instruments if they are right, and how far it may by chance says
-        the rest that they leave (Anderson and Rubin 1949): true however little a drive tells.
+        """Returns d^2 between the estimates of some unknowns and these values.
+
+        If the values are right, their residuals are uncorrelated with the instruments up to chance,
+        which the residuals themselves give (Anderson and Rubin 1949). That holds however weak the
+        instruments are.
         """
         some = np.asarray(which)
         others = np.setdiff1d(np.arange(len(self.x)), some)
@@ -149,15 +164,18 @@ class Fit:
 
     @property
     def beyond_doubt(self) -> float:
-        """By how much more than 4 standard errors something must be off to be as unlikely as 4 of
-        a normal distribution: of few blocks they are known badly themselves (Student 1908).
+        """Returns the factor by which Student's t for these blocks exceeds 4 standard errors.
+
+        With few blocks the standard errors are badly known themselves (Student 1908).
         """
-        degrees = self.blocks / (1 + NEIGHBOURS)  # of the variance: neighbours are told together
+        degrees = self.blocks / (1 + NEIGHBOURS)  # of the variance: neighbours count together
         return float(np.sqrt(degrees * np.expm1(SURE**2 / (degrees - 0.5))) / SURE)
 
     def known(self, which: int) -> float:
-        """The standard error of an unknown. Where the drive tells little of it, by how likely it is
-        that there is none of it, if that is more.
+        """Returns the standard error of an unknown, or the one by the likelihood of zero, if
+        larger.
+
+        The latter is for drives that show little of it.
         """
         sigma = float(self.sigma[which])
         if self.strength(which) < STRONG:
@@ -166,7 +184,7 @@ class Fit:
         return self.beyond_doubt * sigma
 
     def covariance_known(self, which: Sequence[int]) -> Floats:
-        """Likewise of several unknowns; of what the drive tells nothing, nothing."""
+        """Returns their covariance likewise; UNTOLD is added where the drive shows nothing."""
         some = np.asarray(which)
         own = self.covariance[np.ix_(some, some)]
         strengths = np.array([self.strength(k) for k in which])
@@ -178,11 +196,12 @@ class Fit:
         return np.asarray(covariance + np.diag(np.where(strengths < TELLS_SIGMAS, UNTOLD, 0.0)))
 
     def strength(self, which: int) -> float:
-        """By how many standard errors an unknown's column and its instrument vary together, by
-        themselves and beyond what the other unknowns explain of both: the less of both. Where it
-        is small, as for the clock on a circle at an even speed, or for the scale beside a bias,
-        what varies is noise, and a weak instrument takes least squares back to what noise makes of
-        the unknown, with a small standard error.
+        """Returns the strength of an unknown's instrument, in standard errors.
+
+        It is the smaller of two covariances of column and instrument: alone, and beyond what the
+        other unknowns explain of both. Where it is small, as for the clock on a circle at constant
+        speed, or for the scale beside a bias, the variation is noise; a weak instrument leads back
+        to plain least squares, with its bias and its small standard error.
         """
         A, X, Z = self._A, self._X, self._Z
         others = np.arange(len(A)) != which
@@ -197,13 +216,15 @@ class Fit:
         return min(found)
 
     def tells(self, which: int) -> bool:
-        """Whether anything is told of an unknown at all."""
+        """Returns whether the drive shows anything of an unknown."""
         return self.strength(which) > TELLS_SIGMAS
 
 
 def _within(Z: Floats, X: Floats) -> Floats:
-    """Instruments where their columns stay: where pictures hang they tell leaps. A column that is
-    its own instrument stays as it is; those behind are of the first ones in their order.
+    """Limits instruments to the range of their columns, for frozen pictures make them leap.
+
+    A column that is its own instrument is not changed; further instruments belong to the first
+    columns in their order.
     """
     low, high = np.quantile(X, WITHIN, axis=0)
     of = np.arange(Z.shape[2]) % X.shape[2]
@@ -212,7 +233,7 @@ def _within(Z: Floats, X: Floats) -> Floats:
 
 
 def _halves(Z: Floats, X: Floats) -> list[tuple[NDArray[np.bool_], Floats, Floats]]:
-    """Which rows are of the pieces of the drive that take turns, and what they hold."""
+    """Returns which rows are in the odd and in the even pieces of the drive, with their Z and X."""
     piece = np.arange(len(X)) // PIECE_FRAMES % 2
     return [(piece == own, Z[piece == own], X[piece == own]) for own in (0, 1)]
 
@@ -222,10 +243,10 @@ def _told_by_others(
     trust: Floats,
     exact: NDArray[np.intp],
 ) -> Floats:
-    """(k, a, m) what the instruments tell of each column of X, by what goes with what in the other
-    pieces of the drive: fitted where it is used, many instruments that know nothing would each
-    explain a little of the column's own noise, and seem to tell something (Angrist, Imbens and
-    Krueger 1999).
+    """Returns (k, a, m) what the instruments predict of X, fitted in the other half of the pieces.
+
+    Fitted where it is used, many useless instruments would each explain a little of the column's
+    own noise, and seem to be of use (Angrist, Imbens and Krueger 1999).
     """
     told = np.empty((*trust.shape, halves[0][2].shape[2]))
     for (here, Z, _), (there, *others) in (halves, halves[::-1]):
@@ -236,9 +257,7 @@ def _told_by_others(
 
 
 def _first_stage(trusted: Floats, Z: Floats, X: Floats, exact: NDArray[np.intp]) -> Floats:
-    """(q, m) that makes of the instruments what they tell of each column of X; of a column that is
-    its own instrument, itself.
-    """
+    """Returns (q, m) that maps instruments to predicted columns of X; an exact column to itself."""
     others = np.setdiff1d(np.arange(X.shape[1]), exact)
     told_by = np.setdiff1d(np.arange(Z.shape[1]), exact)
     stage = np.zeros((Z.shape[1], X.shape[1]))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What an IMU says of the way from frame to frame, as far as it says it without being told a start.
+"""The displacements between frames by an IMU, up to an unknown start.
 
-With R(t) the attitude from the start of a stretch on, as gyro or images have it, the velocity is
-V + g t + int R M (a - b_a): V and g, three numbers each, are unknown in every stretch, and so is
-what the accelerometer is off by. All of them enter linearly, so what is measured is left to least
-squares: M, of which the identity is expected, or one scale; biases; and the clock.
+With R(t) the attitude since the start of a stretch, from gyro or images, the velocity is V + g t +
+int R M (a - b_a). V and g, three numbers each, are unknown in every stretch, and so is the
+accelerometer's bias. All enter linearly, so least squares solves for them and for what is measured:
+M, whose expected value is the identity, or one scale; biases; and the clock.
 """
 
 from __future__ import annotations
@@ -29,24 +29,25 @@ OWN = 6  # unknowns of a stretch: V and g
 
 @dataclass(frozen=True)
 class Force:
-    """Mean velocities between frames k and k + 1 in body axes, (k, 3, ...); NaN where the readings
-    do not reach. `turn` are the mean rates.
+    """Mean velocities between frames k and k + 1 in body axes, (k, 3, ...), and their derivatives.
+
+    NaN where there are no readings. `turn` are the mean rates.
     """
 
     turn: Floats
-    of_force: Floats  # (k, 3, 3, 3): of M_ij
-    of_bias: Floats  # (k, 3, 3): of b_a
-    of_gyro: Floats  # (k, 3, 3): of a gyro that reads so much too much
-    of_start: Floats  # (k, 3, 6): of V and g of the stretch
+    of_force: Floats  # (k, 3, 3, 3): by M_ij
+    of_bias: Floats  # (k, 3, 3): by b_a
+    of_gyro: Floats  # (k, 3, 3): by a gyro bias
+    of_start: Floats  # (k, 3, 6): by V and g of the stretch
     stretch: NDArray[np.intp]
 
     @property
     def way(self) -> Floats:
-        """With M as it should be: (k, 3)."""
+        """Returns (k, 3) the mean velocities with M the identity."""
         return np.asarray(np.einsum("naii->na", self.of_force))
 
     def of_stretches(self) -> Floats:
-        """(k, 3, 6 n): the unknowns of all stretches side by side."""
+        """Returns (k, 3, 6 n) the derivatives by the unknowns of all stretches, side by side."""
         count = int(self.stretch.max(initial=-1)) + 1
         out = np.zeros((len(self.stretch), 3, count, OWN))
         out[np.arange(len(self.stretch)), :, self.stretch] = self.of_start
@@ -54,7 +55,7 @@ class Force:
 
 
 def by_gyro(readings: Inertial, bias: Floats) -> Floats:
-    """(n, 3, 3) attitudes at the readings, the first one's axes being the world's."""
+    """Returns (n, 3, 3) attitudes by the gyro; the first one's axes are the world's."""
     w = readings.w_B_radps - bias
     tau = np.diff(readings.t_ns)[:, None] * 1e-9
     steps = se3.exp(np.zeros((len(tau), 3)), 0.5 * (w[1:] + w[:-1]) * tau).R
@@ -66,7 +67,7 @@ def by_gyro(readings: Inertial, bias: Floats) -> Floats:
 
 
 def by_images(readings: Inertial, frame_s: Floats, turns: Floats) -> Floats:
-    """The same from the images' own turns (k, 3), radians in body axes from frame to frame."""
+    """Returns the same by the images' turns (k, 3), radians in body axes from frame to frame."""
     t = seconds(readings)
     R = np.empty((len(turns) + 1, 3, 3))
     R[0] = np.eye(3)
@@ -79,7 +80,7 @@ def by_images(readings: Inertial, frame_s: Floats, turns: Floats) -> Floats:
 
 
 def thinned(readings: Inertial, most_hz: float = READINGS_HZ) -> Inertial:
-    """Means of as many as bring the rate down to so much: faster than that no body turns."""
+    """Returns the readings averaged down to this rate, faster than which no body turns."""
     t = readings.t_ns
     rate = (len(t) - 1) / max(float(t[-1] - t[0]) * 1e-9, 1e-9) if len(t) > 1 else 0.0
     group = int(rate / most_hz)
@@ -93,12 +94,16 @@ def thinned(readings: Inertial, most_hz: float = READINGS_HZ) -> Inertial:
 
 
 def seconds(readings: Inertial) -> Floats:
-    """From the first reading on."""
+    """Returns the readings' times since the first one."""
     return np.asarray((readings.t_ns - readings.t_ns[0]) * 1e-9)
 
 
 def force(readings: Inertial, R: Floats, frame_s: Floats, breaks_s: Floats = NO_BREAKS) -> Force:
-    """`frame_s` on the IMU's clock, from the first reading on; at `breaks_s` a stretch begins."""
+    """Returns the mean velocities between frames by the readings.
+
+    `frame_s` is on the IMU's clock, since the first reading; a stretch begins at each of
+    `breaks_s`.
+    """
     t = seconds(readings)
     turns, at = _attitudes(R, t, frame_s)
     tau = np.diff(frame_s)
@@ -106,7 +111,7 @@ def force(readings: Inertial, R: Floats, frame_s: Floats, breaks_s: Floats = NO_
     body = _to_body(at, turns) / tau[:, None, None]
 
     def mean(rate: Floats) -> Floats:
-        """Of an acceleration in the world (n, 3, m), what it adds to the velocity."""
+        """Returns the mean body velocities that an acceleration in the world (n, 3, m) adds."""
         return np.asarray(body @ (_twice(t, rate, frame_s, begin[stretch])))
 
     a = readings.a_B_mps2
@@ -115,7 +120,7 @@ def force(readings: Inertial, R: Floats, frame_s: Floats, breaks_s: Floats = NO_
     own = np.clip(np.searchsorted(begin, t, side="right") - 1, 0, len(begin) - 1)
     since = J - _interpolated(t, J, begin)[own]
     f = np.einsum("nij,nj->ni", R, a)
-    # attitude is off by -J b: what that makes of the force, in the world
+    # the attitude is off by -J b: the error of the force in the world
     of_gyro = mean(np.cross(f[:, :, None], since, axisa=1, axisb=1, axisc=1))
     first, second = frame_s[:-1] - begin[stretch], frame_s[1:] - begin[stretch]
     start = np.concatenate(
@@ -132,28 +137,28 @@ def force(readings: Inertial, R: Floats, frame_s: Floats, breaks_s: Floats = NO_
 
 
 def rates_of_turn(readings: Inertial, R: Floats, frame_s: Floats) -> Floats:
-    """(k, 3) on average from each frame to the next; NaN where the readings do not reach."""
+    """Returns (k, 3) mean rates from each frame to the next; NaN where there are no readings."""
     t = seconds(readings)
     turns, _ = _attitudes(R, t, frame_s)
     return _reached(t, turns / np.diff(frame_s)[:, None], frame_s)
 
 
 def mean_rates(readings: Inertial, frame_s: Floats) -> Floats:
-    """(k, 3) means of the gyro's readings, as rates_of_turn."""
+    """Returns (k, 3) means of the gyro's readings; otherwise as rates_of_turn."""
     t = seconds(readings)
     turned = np.diff(_interpolated(t, _summed(t, readings.w_B_radps), frame_s), axis=0)
     return _reached(t, turned / np.diff(frame_s)[:, None], frame_s)
 
 
 def _reached(t: Floats, rates: Floats, frame_s: Floats) -> Floats:
-    """NaN where the readings do not reach."""
+    """Returns the rates with NaN where there are no readings."""
     out = (frame_s[:-1] < 0) | (frame_s[1:] > t[-1]) | pauses(t, frame_s[:-1], frame_s[1:])
     rates[out] = np.nan
     return np.asarray(rates)
 
 
 def _stretches(frame_s: Floats, t: Floats, breaks_s: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Which stretch an interval is in, and when each begins: behind a pause, too."""
+    """Returns each interval's stretch, and when stretches begin; pauses begin one, too."""
     whole = max(frame_s[-1] - frame_s[0], 1e-9)
     count = max(int(np.ceil(whole / STRETCH_S)), 1)
     count = max(min(count, (len(frame_s) - 1) // STRETCH_FRAMES), 1)
@@ -165,7 +170,7 @@ def _stretches(frame_s: Floats, t: Floats, breaks_s: Floats) -> tuple[NDArray[np
 
 
 def _attitudes(R: Floats, t: Floats, frame_s: Floats) -> tuple[Floats, Floats]:
-    """Turns from frame to frame (rad, in body axes), and the attitudes at all but the last."""
+    """Returns turns between frames (rad, in body axes), and the attitudes at all but the last."""
     k = np.clip(np.searchsorted(t, frame_s, side="right") - 1, 0, len(t) - 2)
     step = se3.log(Poses(np.swapaxes(R[k], 1, 2) @ R[k + 1], np.zeros((len(k), 3))))[:, 3:]
     share = np.clip((frame_s - t[k]) / (t[k + 1] - t[k]), 0, 1)
@@ -176,21 +181,21 @@ def _attitudes(R: Floats, t: Floats, frame_s: Floats) -> tuple[Floats, Floats]:
 
 
 def _to_body(at: Floats, turns: Floats) -> Floats:
-    """(k, 3, 3): from a way in the world to the constant velocity that goes it while turning so."""
+    """Returns (k, 3, 3) maps of a displacement in the world to its constant body velocity."""
     R = se3.exp(np.zeros_like(turns), turns).R
     columns = [se3.log(Poses(R, np.tile(e, (len(R), 1))))[:, :3] for e in np.eye(3)]
     return np.asarray(np.stack(columns, axis=2) @ np.swapaxes(at, 1, 2))
 
 
 def _summed(t: Floats, rate: Floats) -> Floats:
-    """The integral from the first reading on, by trapezoids."""
+    """Returns the integral since the first reading, by trapezoids."""
     steps = np.diff(t).reshape(-1, *(1,) * (rate.ndim - 1))
     total = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * steps, axis=0)
     return np.concatenate((np.zeros_like(rate[:1]), total))
 
 
 def _twice(t: Floats, rate: Floats, frame_s: Floats, begin_s: Floats) -> Floats:
-    """(k, 3, m): the way of each interval by an acceleration from `begin_s` of its stretch on."""
+    """Returns (k, 3, m) each interval's displacement by an acceleration since its begin."""
     once = _summed(t, rate)
     place = _interpolated(t, _summed(t, once), frame_s)
     tau = np.diff(frame_s)[:, None, None]

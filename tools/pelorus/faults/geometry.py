@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Faults of what lies between camera and body: units, axes, extrinsic, lever, scale and clocks.
+"""Detects faults between camera and body: units, axes, extrinsic, lever, scale and clocks.
 
-Each is told by how far it is from what is expected, in its own standard errors, and by whether that
-matters. What the data cannot tell apart is not guessed at.
+Each is judged by its distance from the expected value in standard errors, and by whether it
+matters. What the data cannot separate is not guessed at.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ from pelorus.faults.handeye import (
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.likelihood import of_estimate, of_share
 from pelorus.faults.moving import USUAL, Moving
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews
 from pelorus.faults.world_axes import world_axes
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
-FIT_LEAST = 0.6  # of the point pairs that one motion explains
-LEFT_MOST = 0.7  # of a motion's size that the twists leave unexplained
-MOVES_MPS = 1.0  # a camera that hardly moves need not agree with the twists' noise
+FIT_LEAST = 0.6  # share of the point pairs that one motion explains
+LEFT_MOST = 0.7  # share of a motion's size that the twists leave unexplained
+MOVES_MPS = 1.0  # a slower camera need not agree with the twists' noise
 TURNED_DEG, ROLLED_DEG, NEAR_DEG, AXES_DEG = 6.0, 50.0, 20.0, 40.0
 PITCH_MOST_DEG = 60.0
-MOSTLY, HEADED_SHARE = 0.85, 0.7  # of a turn, what is about one axis, and what the way tells
-PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 4.0  # where velocities and turns tell it together
+MOSTLY, HEADED_SHARE = 0.85, 0.7  # share of a turn about one axis, and share that the heading shows
+PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 4.0  # where velocities and turns show it together
 SURE_SIGMAS = 4.0
-MOVES_SIGMAS, WORLD_SURE = 4.0, 16.0  # standard errors; 2 ln of the ratio of likelihoods
+MOVES_SIGMAS, WORLD_SURE = 4.0, 16.0  # standard errors; 2 ln of the likelihood ratio
 UNIT_NEAR = 0.15
 UNEXPLAINED = ("no-fit", "scene")
 
@@ -61,8 +61,10 @@ Ask = Callable[[], Agreement]
 
 @dataclass(frozen=True)
 class Judged:
-    """What is wrong, and where it came to that, how far camera and body agree and the views that
-    told it, of neighbouring frames of the first part.
+    """The faults that were found.
+
+    Where they were reached: how far camera and body agree, and the views between neighbouring
+    frames of the first part that showed it.
     """
 
     faults: list[Fault]
@@ -71,10 +73,10 @@ class Judged:
 
 
 def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> Judged:
-    """`views` of neighbouring frames. Nothing where all is well."""
+    """Looks for faults of geometry; `views` are of neighbouring frames."""
     by_imu = len(recording.inertial.t_ns) > 0
-    ask = cache(lambda: agreement(recording, views, seen))  # it takes longer than all the rest
-    seen = Seen.of(recording, views)
+    ask = cache(lambda: agreement(recording, views, seen))  # it takes longer than all else
+    seen = CameraMotion.of(recording, views)
     wrong = [*_unfit(int(seen.usable.sum()), share_of_fit(views))] or [*_standing(seen, moved)]
     if not wrong:
         seen = halved(recording, seen, views.lag) if by_imu else seen
@@ -83,27 +85,29 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     if wrong and not unexplained:
         return Judged(wrong)
     moves = list(_moving(moved(), bool(unexplained)))
-    if wrong:  # what moves explains it
+    if wrong:  # moving objects explain it
         return Judged(moves or wrong)
     agreed = ask()
-    if not agreed.told:
+    if not agreed.is_known:
         return Judged(moves)
     faults = moves
-    if not moves:  # what moves looks like another scale, or another place of the camera
+    if not moves:  # moving objects look like another scale or place of the camera
         faults = [*_pitch(recording, agreed), *of_lever(recording, agreed)]
         if by_imu and not any(fault.name == "lever" for fault in faults):
             faults += of_place(recording, agreed)
         faults += of_scale_by_imu(agreed) if by_imu else of_scale(agreed, bias_mps(recording))
     faults = [*faults, *of_clock(recording, agreed)]
-    if not (faults or by_imu):  # beside another fault a place may be off by what that does
+    if not (faults or by_imu):  # another fault may shift the place
         faults = list(of_place(recording, agreed))
     return Judged(faults, agreed)
 
 
-def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> Iterator[Fault]:
-    """Units, axes and the extrinsic's rotation."""
+def _of_twists(
+    recording: Recording, seen: CameraMotion, views: TwoViews, ask: Ask
+) -> Iterator[Fault]:
+    """Yields faults of units, axes and the extrinsic's rotation, by twists."""
     found = hand_eye(recording, views)
-    if not found.told:
+    if not found.is_known:
         yield _untold(found.frames)
         return
     if not (recording.v_B_mps.any() or recording.w_B_radps.any()):
@@ -127,8 +131,8 @@ def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> I
     yield from _in_world(recording, seen) or turned
 
 
-def _in_world(recording: Recording, seen: Seen) -> list[Fault]:
-    """Are the velocities those of the body, in axes that do not turn with it?"""
+def _in_world(recording: Recording, seen: CameraMotion) -> list[Fault]:
+    """Returns a fault if the velocities are in axes that do not turn with the body."""
     ratio = world_axes(recording, seen)
     if ratio < WORLD_SURE:
         return []
@@ -144,8 +148,8 @@ def _in_world(recording: Recording, seen: Seen) -> list[Fault]:
     ]
 
 
-def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
-    """The same of an IMU's."""
+def _of_imu(recording: Recording, seen: CameraMotion) -> Iterator[Fault]:
+    """Yields faults of units, axes and the extrinsic's rotation, by an IMU."""
     body = ImuBody(recording, seen)
     found = imu_axes.measured(recording, seen, body)
     if found is None:
@@ -167,8 +171,8 @@ def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
         yield replace(fault, ratio=found.held_against(none) - found.held_against(why))
 
 
-def _at_times(recording: Recording, seen: Seen, body: ImuBody) -> Fault | None:
-    """Do the two disagree for some time alone, and agree otherwise?"""
+def _at_times(recording: Recording, seen: CameraMotion, body: ImuBody) -> Fault | None:
+    """Returns a fault if camera and IMU disagree for some of the time only."""
     wrong = platform.disagreeing(recording, seen, body)
     if not wrong.any():
         return None
@@ -189,7 +193,7 @@ def _at_times(recording: Recording, seen: Seen, body: ImuBody) -> Fault | None:
 
 
 def _why(why: imu_axes.Explained, given: Floats) -> Fault | None:
-    """In words; nothing where a turn is too small to matter."""
+    """Returns the explanation as a fault; None where a turn is too small to matter."""
     off = angle_between(why.of_turn, np.eye(3))
     if why.name == "no-fit":
         words = "camera and IMU do not tell the same motion, and no known fault explains why"
@@ -205,7 +209,7 @@ def _why(why: imu_axes.Explained, given: Floats) -> Fault | None:
 
 
 def _unfit(frames: int, fit: float) -> Iterator[Fault]:
-    """Too little to tell by, or points that tell no motion."""
+    """Yields a fault where there are too few data, or the points fit no motion."""
     if frames < FRAMES_ENOUGH:
         yield _untold(frames)
     elif fit < FIT_LEAST:
@@ -223,8 +227,8 @@ def _untold(frames: int) -> Fault:
     return Fault(UNTOLD, words, stops=False, grave=False)
 
 
-def _standing(seen: Seen, moved: Callable[[], Moving]) -> Iterator[Fault]:
-    """A camera that stands tells noise, whatever is held against it."""
+def _standing(seen: CameraMotion, moved: Callable[[], Moving]) -> Iterator[Fault]:
+    """Yields a fault where the camera stands, for its motion is then noise."""
     if seen.moves < MOVES_SIGMAS and not moved().more_than_usual:
         how = "shakes for some time, and hardly moves" if seen.shakes else "stands all along"
         words = f"the camera {how}: axes, units, scale, clock and place cannot be judged"
@@ -235,7 +239,7 @@ def _standing(seen: Seen, moved: Callable[[], Moving]) -> Iterator[Fault]:
 
 
 def _units(found: HandEye) -> Iterator[Fault]:
-    """c = s b: with degrees b is 57 times too large, so s is 1/57."""
+    """Yields a fault of units by c = s b: with degrees b is 57 times too large, so s is 1/57."""
     turns = found.turn_scale, found.turn_sigma
     ways = found.way_scale, found.way_sigma
     for name, (scale, sigma), unit, words in (
@@ -247,24 +251,24 @@ def _units(found: HandEye) -> Iterator[Fault]:
         ("km/h", ways, 3.6, "velocities: m/s were made of km/h twice"),
     ):
         near = UNIT_NEAR + (0.3 if abs(np.log(unit)) > np.log(10) else 0)
-        if name == "degrees" and not found.turns_told:
+        if name == "degrees" and not found.turns_are_known:
             continue
         if scale > 0 and abs(np.log(scale / unit)) < near:
             shown = f"the images show {scale:.3g} times the {words}"
             yield Fault(f"unit-{name}", shown, ratio=of_estimate(scale, 1.0, unit, sigma))
-            return  # ways of a lever are the turns', too
+            return  # a lever's displacements depend on the turns, too
 
 
 # --- axes and extrinsic ---------------------------------------------------------------------------
 
 
 def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) -> Iterator[Fault]:
-    """The rotation, and whether each of the twists' axes is the one that is meant."""
+    """Yields faults of the rotation, and of single axes of the twists."""
     given = recording.T_CB.R
     off = angle_between(found.R, given)
     sigmas = off / _sigma_deg(found, given)
     sure = sigmas > SURE_SIGMAS
-    rolled = off > ROLLED_DEG and found.turns_told
+    rolled = off > ROLLED_DEG and found.turns_are_known
     axes = list(_axes(recording, views))
     cosine = float((found.R @ found.heading_B) @ (given @ found.heading_B))
     headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
@@ -272,7 +276,8 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
         yield replace(_inverted(off), ratio=sigmas**2)
     elif axes:
         yield from axes
-    # the way tells where the camera looks; the roll about it only the turns do, which may be noise
+    # velocities show where the camera looks; only turns show the roll about it, and they may be
+    # noise
     elif (
         sure and found.way_left < LEFT_MOST and (headed > _straight_deg(recording, found) or rolled)
     ):
@@ -281,16 +286,14 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
         if off < NEAR_DEG and _otherwise(ask(), off):
             return
         if by_pitch and HEADED_SHARE * off < headed and off < NEAR_DEG:
-            fault = _pitched(f"{headed:.0f}")  # the rest is roll, known worse
+            fault = _pitched(f"{headed:.0f}")  # the rest is roll, which is known worse
         else:
             fault = _turned(given, found.R, off)
         yield replace(fault, ratio=sigmas**2)
 
 
 def _otherwise(agreed: Agreement, off: float) -> bool:
-    """Whether what looks like a turn is none once all else may be wrong as well: at walking speed a
-    lever that is off turns the way of the camera by as much.
-    """
+    """Returns whether other unknowns explain the turn: a wrong lever looks like one."""
     if agreed.tilt_rad is None or agreed.tilt_covariance is None:
         return False
     left = float(np.degrees(np.linalg.norm(agreed.tilt_rad)))
@@ -299,20 +302,20 @@ def _otherwise(agreed: Agreement, off: float) -> bool:
 
 
 def _straight_deg(recording: Recording, found: HandEye) -> float:
-    """Within which the way is along the camera: a bias across it turns it."""
+    """Returns how far a bias across the way may turn the camera's heading, degrees."""
     bias = BIAS_SIGMAS * bias_mps(recording) / (found.speed_mps + 1e-12)
     return float(np.hypot(TURNED_DEG, np.degrees(np.arctan(bias))))
 
 
 def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
-    seen = Seen.of(recording, views)
+    seen = CameraMotion.of(recording, views)
     rates = TwistBody(recording).rates(recording.frame_t_ns, 1, 0.0)
     arm = -recording.T_CB.R.T @ recording.T_CB.p
     own = np.where(seen.usable[:, None], seen.rates, np.nan)
     turn = own[:, 3:]
     of_way, of_turn = mounting.best_of_both(
-        mounting.Rates(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn),
-        mounting.Rates(turn, rates[:, 3:]),
+        mounting.MotionPairs(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn),
+        mounting.MotionPairs(turn, rates[:, 3:]),
     )
     won = {
         whose: found
@@ -329,7 +332,7 @@ def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
 
 
 def _words(F: Floats) -> str:
-    """y for x, -z for z: y = F b, so what stands as b's k-th is that axis of what is expected."""
+    """Returns the axes in words: y for x, -z for z. With y = F b, b's k-th axis is given by F."""
     parts = [f"{_axis_name(column)} for {'xyz'[k]}" for k, column in enumerate(F.T)]
     return ", ".join(part for k, part in enumerate(parts) if not part.startswith("xyz"[k]))
 
@@ -355,7 +358,7 @@ def _turned(given: Floats, found: Floats, off: float) -> Fault:
 
 
 def _pitch(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """A few degrees, which the way alone cannot tell from a velocity that is biased across it."""
+    """Yields a fault of a few degrees of pitch, which for velocities alone may be a bias."""
     if agreed.tilt_rad is None or agreed.tilt_covariance is None:
         return
     across = recording.T_CB.R[0]  # the camera's x in the body
@@ -371,8 +374,8 @@ def _pitched(degrees: str) -> Fault:
 
 
 def _sigma_deg(found: HandEye, given: Floats) -> float:
-    """How well the turn between the two rotations is known. Of a drive straight ahead nothing tells
-    the roll.
+    """Returns the standard error of the turn between both rotations; straight ways leave roll
+    open.
     """
     axis = _axis_of(found.R @ given.T)
     return float(np.degrees(np.sqrt(axis @ found.R_covariance @ axis)))
@@ -391,7 +394,10 @@ def _axis_of(R: Floats) -> Floats:
 
 
 def _moving(found: Moving, misleads: bool) -> Iterator[Fault]:
-    """`misleads`: nothing else explains why camera and body do not tell one motion."""
+    """Yields a fault of moving objects.
+
+    `misleads`: nothing else explains why camera and body show different motions.
+    """
     if found.more_than_usual:
         so = ": camera and body do not tell the same motion" if misleads else ""
         yield Fault(

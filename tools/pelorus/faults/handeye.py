@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""What the images alone say of the camera's motion, beside what the twists say of the body's.
+"""Compares the camera's motion by the images alone with the body's by the twists.
 
 Rates of turn and velocities, one of each for every pair of frames:
 
     w_C = a R w_B,    v_C = b R (v_B + w_B x r)          r: the camera's place in the body
 
-With R, a, b free and robust weights, R beside the given R_CB, a and b beside 1 say what is wrong
-with the extrinsic, with units, with the calibration's scale. Nothing is assumed of the axes: cars
-turn about one and drive along another, and two directions settle a rotation.
+With R, a, b free and robust weights, R against the given R_CB, and a and b against 1, show errors
+of the extrinsic, of units and of the calibration's scale. No axes are assumed: cars turn about one
+and drive along another, and two directions fix a rotation.
 """
 
 from __future__ import annotations
@@ -24,19 +24,21 @@ from pelorus.layout import Floats
 from pelorus.motion import held
 from pelorus.recording import Recording
 
-SEEN_MOST = 60_000  # observations: they take the time, be it many frames or many points
+SEEN_MOST = 60_000  # observations, which determine the time it takes
 POINTS_MIN = 6  # of a pair of frames
 ROUNDS = 10
 MOVES_MPS, TURNS_RADPS = 0.05, 0.01  # below, a velocity or a rate has no direction
 FRAMES_ENOUGH = 50
 TURNS_SIGMAS = 4.0
-FITS_D2, FITS_PX = 25.0, 3.0  # a pair of one rigid scene fits its frame's motion so well
+FITS_D2, FITS_PX = 25.0, 3.0  # limits for a pair that fits its frame's motion
 
 
 @dataclass(frozen=True)
 class HandEye:
-    """`R`, `turn_scale`, `way_scale` and their one-sigma; `fit`: the share of point pairs that one
-    motion a frame explains; `excited`: whether there is way and turn to tell by.
+    """The fit of camera and body motion.
+
+    `R`, `turn_scale`, `way_scale` and their sigmas; `fit`: the share of point pairs that one motion
+    a frame explains; `excited`: whether displacements and turns suffice.
     """
 
     frames: int
@@ -46,25 +48,26 @@ class HandEye:
     turn_sigma: float
     way_scale: float
     way_sigma: float
-    way_left: float  # of the ways what the fit does not explain, as a share
+    way_left: float  # share of the displacements that the fit does not explain
     R_covariance: Floats  # rad^2, of a small turn on the left of R
     heading_B: Floats  # unit vector: where the body mostly drives
-    speed_mps: float  # of the camera, as the images have it
+    speed_mps: float  # of the camera, by the images
 
     @property
-    def turns_told(self) -> bool:
-        """Whether the rates of turn are the camera's at any scale; on a straight way they may be
-        noise, and what fits noise best is no fault.
+    def turns_are_known(self) -> bool:
+        """Returns whether the rates of turn are the camera's at any scale.
+
+        On a straight way they may be noise, and what fits noise best is no fault.
         """
         return abs(self.turn_scale) > TURNS_SIGMAS * self.turn_sigma
 
     @property
-    def told(self) -> bool:
+    def is_known(self) -> bool:
         return self.frames >= FRAMES_ENOUGH
 
 
 def first_part(recording: Recording) -> Recording:
-    """The beginning, as much as tells in a reasonable time."""
+    """Returns the beginning, as long as it can be examined in a reasonable time."""
     tracks = recording.tracks
     most = int(np.searchsorted(tracks.bounds(), SEEN_MOST, side="right")) - 1
     if tracks.frame_count <= most:
@@ -75,18 +78,20 @@ def first_part(recording: Recording) -> Recording:
 
 
 def hand_eye(recording: Recording, views: TwoViews) -> HandEye:
-    """Fit both motions to one another; `views` are of neighbouring frames."""
+    """Fits both motions to one another; `views` are of neighbouring frames."""
     fit = share_of_fit(views)
     tau = np.diff(recording.frame_t_ns) * 1e-9
-    # motion maps camera k to k + 1: the body's own motion is its inverse
+    # motion maps camera k to k + 1; the body's own motion is its inverse
     of_camera = se3.log(se3.inverse(views.motion)) / tau[:, None]
     usable = (views.counts >= POINTS_MIN) & (tau <= GAP_PERIODS * np.median(tau))
     return _fit(recording, of_camera, mean_twists(recording), usable, fit)
 
 
 def mean_twists(recording: Recording) -> Floats:
-    """(k, 6) of the readings from frame to frame: of the motion that they make but for the order of
-    turns, and right for degrees as well, which go round between two frames.
+    """Returns (k, 6) means of the readings from frame to frame.
+
+    That is the motion but for the order of turns. Unlike the motion it is right for degrees, too,
+    which go round several times between two frames.
     """
     t_ns, frames = recording.twist_t_ns, recording.frame_t_ns
     readings = np.hstack((recording.v_B_mps, recording.w_B_radps))
@@ -101,7 +106,7 @@ def mean_twists(recording: Recording) -> Floats:
 
 
 def share_of_fit(views: TwoViews) -> float:
-    """Of the pairs of observations those that their frame's motion explains."""
+    """Returns the share of the pairs of observations that their frame's motion explains."""
     fits = views.d2 < np.maximum(FITS_D2, (FITS_PX / views.sigma_px) ** 2)
     return float(np.mean(fits)) if len(fits) else 0.0
 
@@ -129,8 +134,9 @@ def _fit(
 
 
 def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> tuple[Floats, Floats]:
-    """Kabsch on both kinds of vectors, each in units of its own size, with robust weights; and the
-    covariance of a small turn, from what is left.
+    """Returns the rotation by Kabsch on both kinds of vectors, and the covariance of a small turn.
+
+    The vectors are in units of their own size, with robust weights; residuals give the covariance.
     """
     pairs = []
     for b, c, least in ((w_B, w_C, TURNS_RADPS), (v_B, v_C, MOVES_MPS)):
@@ -156,7 +162,7 @@ def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> tuple[Float
 
 
 def _scale(c: Floats, b: Floats) -> tuple[float, float, float]:
-    """c = s b, robust, along b and free of b's noise by instruments: b of the frames beside."""
+    """Returns s of c = s b, robustly, with b of neighbouring frames as instruments."""
     instrument = 0.5 * (np.roll(b, 1, axis=0) + np.roll(b, -1, axis=0))
     instrument[[0, -1]] = 0
     offset_c, offset_b = np.zeros(3), np.zeros(3)
@@ -175,6 +181,6 @@ def _scale(c: Floats, b: Floats) -> tuple[float, float, float]:
 
 
 def angle_between(A: Floats, B: Floats) -> float:
-    """Of two rotations, degrees."""
+    """Returns the angle between two rotations, degrees."""
     cosine = (np.trace(A.T @ B) - 1) / 2
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))

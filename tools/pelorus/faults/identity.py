@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Does an id stay with its point? Slots are given to one point after another, row numbers to any.
+"""Detects ids that do not stay with their points: slots that are reused, or row numbers.
 
 A track that ends leaves its slot to the next point: from one frame to the next the id jumps, and
-before and behind the jump it follows a point well. A bad match looks otherwise: the track comes
-back. So does a point that was out of sight, and is seen again where it must be.
+before and after the jump it follows a point well. A bad match looks different: the track comes
+back. So does a point that was hidden, and is seen again where it must be.
 """
 
 from __future__ import annotations
@@ -29,15 +29,16 @@ ROWS_SHARE, WRONG_TOGETHER = 0.9, 0.15
 JUMP_PX, SOUND_D2 = 12.0, 16.0
 JUMPS_LEAST, JUMPS_SHARE = 5, 0.2  # of the tracks that end
 ELSEWHERE_SHARE = 0.6  # of the points that are seen again
-BY_CHANCE, CHANCE = 0.1, 1e-3  # a share that bad matches make, and how likely they make so many
+BY_CHANCE, CHANCE = 0.1, 1e-3  # share of bad matches, and the probability of so many
 POINTS_MIN = 6  # of a pair of frames
-GAP_MOST = 5  # frames over which the images tell where a point must be
+GAP_MOST = 5  # frames over which the images predict a point's place
 ELSEWHERE = 0.08  # of the picture's width
 
 
 def follow(tracks: Tracks, views: TwoViews) -> bool:
-    """Whether ids stay with their points but for single ones: one row less, and all those behind it
-    are other points.
+    """Returns whether ids stay with their points but for single ones.
+
+    With row numbers, one row less makes all later ids other points.
     """
     bad = _wrong(tracks, views)
     pairs = np.bincount(views.frame)
@@ -47,7 +48,7 @@ def follow(tracks: Tracks, views: TwoViews) -> bool:
 
 
 def _wrong(tracks: Tracks, views: TwoViews) -> Flags:
-    """Pairs that cannot be of one point of the world, whatever the noise is taken for."""
+    """Returns which pairs cannot be of one point of the world, at any noise."""
     step = tracks.pixels[views.second] - tracks.pixels[views.first]
     moved = np.linalg.norm(step[:, :2], axis=1)
     off_px = np.sqrt(views.d2) * views.sigma_px
@@ -55,7 +56,7 @@ def _wrong(tracks: Tracks, views: TwoViews) -> Flags:
 
 
 def are_rows(tracks: Tracks) -> bool:
-    """0, 1, 2, ... in nearly every frame: of a full table of slots, too."""
+    """Returns whether ids are 0, 1, 2, ... in nearly every frame; a full table of slots is, too."""
     first, rows = [], []
     for a, b in pairwise(tracks.bounds().tolist()):
         if b - a > ROWS_LEAST:
@@ -66,16 +67,16 @@ def are_rows(tracks: Tracks) -> bool:
 
 @dataclass(frozen=True)
 class Jumps:
-    """Tracks that go on elsewhere, beside those that end."""
+    """Tracks that continue at another place, against those that end."""
 
     jumps: int
     ends: int
     again: int  # points seen again after a few frames
-    elsewhere: int  # of these far from where they must be
+    elsewhere: int  # of these, far from the predicted place
 
     @property
     def ratio(self) -> float:
-        """2 ln of the likelihood of so many beside that of the most that bad matches make."""
+        """Returns 2 ln of the likelihood ratio of so many jumps against the most by bad matches."""
         goes_on, ends = self.jumps + self.elsewhere, self.jumps + self.ends
         return max(
             of_share(self.elsewhere / max(self.again, 1), self.again, BY_CHANCE),
@@ -92,7 +93,7 @@ class Jumps:
 
 
 def jumps(recording: Recording, views: TwoViews) -> Jumps:
-    """`views` of neighbouring frames."""
+    """Counts the jumps; `views` are of neighbouring frames."""
     tracks = recording.tracks
     px = tracks.pixels
     same = (px[views.first] == px[views.second]).all(axis=1)
@@ -109,8 +110,10 @@ def jumps(recording: Recording, views: TwoViews) -> Jumps:
 
 
 def _again(recording: Recording, views: TwoViews) -> tuple[int, int]:
-    """Points that come back within a few frames, and those that come back elsewhere: by the images'
-    own motion, for twists in wrong units or axes would put every point elsewhere.
+    """Counts points that come back within a few frames, and those that come back elsewhere.
+
+    The images' own motion predicts the place: twists in wrong units or axes would put every point
+    elsewhere.
     """
     tracks, camera = recording.tracks, recording.header.camera
     order = np.lexsort((tracks.frame, tracks.id))
@@ -131,7 +134,7 @@ def _again(recording: Recording, views: TwoViews) -> tuple[int, int]:
 
 
 def _between(steps: Poses, first: Indices, last: Indices) -> Poses:
-    """All steps from one frame to another, GAP_MOST at most."""
+    """Returns the motion from one frame to another, GAP_MOST steps at most."""
     motion = Poses(np.tile(np.eye(3), (len(first), 1, 1)), np.zeros((len(first), 3)))
     for k in range(GAP_MOST):
         more = first + k < last

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Is an IMU in the axes and units that the extrinsic and the HEADER mean?
+"""Detects an IMU in other axes or units than the extrinsic and the HEADER say.
 
-Between what the images show in body axes and what the readings say stands a matrix, of which the
-identity is expected: M_w for the rates of turn, M_a for the specific force. Both are measured, and
-the simplest fault that explains both is named: units and signs, the extrinsic's inverse, axes that
-are turned, mirrored or swapped, for gyro and accelerometer together or for one of them, any
-rotation. Attitudes are the images' own where the gyro is wrong, so that it does not spoil the
-force. What the drive does not move, the matrices do not tell, and nothing is said of it.
+A matrix maps what the images show in body axes to the readings: M_w for the rates of turn, M_a for
+the specific force; the identity is expected. Both are measured, and the simplest fault that
+explains both is named: units and signs, the extrinsic's inverse, axes that are turned, mirrored or
+swapped, for gyro and accelerometer together or for one of them, any rotation. Attitudes are the
+images' own where the gyro is wrong, so that it does not spoil the force. What the drive does not
+excite stays unknown, and is not reported.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from pelorus.faults.axes import ways
 from pelorus.faults.fit import WITHIN, Design, Fit
 from pelorus.faults.force import NO_BREAKS, by_images, force
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.seen import Motions, Seen
+from pelorus.faults.seen import CameraMotion, Motions
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.tracks import Indices
 
-LIMIT = 50.0  # by which d^2, of 18 degrees of freedom, may be above the least of all
-UNFIT, UNFIT_SHARE = 300.0, 0.2  # above, and above such a share of what it is as given, none fits
-DOUBT = 0.03  # by which an entry of a matrix may be off besides, of its scale
-FREE_SCALE = 0.25  # calibrations are off by less; what is off so little is judged elsewhere
+LIMIT = 50.0  # by which d^2, of 18 degrees of freedom, may exceed the least
+UNFIT, UNFIT_SHARE = 300.0, 0.2  # above this, and this share of the given axes' d^2, none fits
+DOUBT = 0.03  # further error of a matrix's entry, relative to its scale
+FREE_SCALE = 0.25  # larger errors are units; smaller ones are judged as calibration
 OFFSETS_S = np.arange(-10, 11) * 0.04
-OFFSET_SURE = 0.05  # of the cost, by which another offset must be better than none
+OFFSET_SURE = 0.05  # share of the cost that another offset must save
 TURNS_SIGMAS, PART_LEAST = 6.0, 3.0
 LEVER_M, BIAS_MPS2, MATRIX = 3.0, 1.0, 1e3
 BLOCKS = 20
@@ -57,8 +57,9 @@ FORCE_UNITS = {
 
 @dataclass(frozen=True)
 class Matrix:
-    """Measured: M, and the covariance of its nine numbers row by row; beside it that by the noise
-    of the readings, for each unit of what M is taken for.
+    """A measured matrix M, with the covariance of its nine numbers row by row.
+
+    A second covariance covers the readings' noise, for each unit of the matrix that is assumed.
     """
 
     M: Floats
@@ -66,8 +67,10 @@ class Matrix:
     by_readings: Floats
 
     def held_against(self, N: Floats, free: bool = True) -> float:
-        """d^2 of N, at the scale beside its own that fits best; and what it costs N, by likelihood,
-        if the noise is wider with it: then it explains anything.
+        """Returns d^2 of the matrix N, at its best scale, plus the cost of the larger noise that it
+        needs.
+
+        Without that cost large noise would explain anything.
         """
         size = float(np.linalg.norm(N) / np.sqrt(3))
         doubt = self.by_readings + DOUBT**2 * np.eye(9)
@@ -76,20 +79,20 @@ class Matrix:
         wider = np.linalg.slogdet(wide)[1] - np.linalg.slogdet(self.covariance + doubt)[1]
         n, m = N.ravel(), self.M.ravel()
         scale = 1.0
-        if free and n.any():  # nothing has no scale
+        if free and n.any():  # zero has no scale
             scale = float(np.clip(n @ known @ m / (n @ known @ n), 1 - FREE_SCALE, 1 + FREE_SCALE))
         left = m - scale * n
         return float(left @ known @ left + max(wider, 0.0))
 
     @property
     def is_told(self) -> bool:
-        """Whether it is something, and not nothing: what is not of this drive has no part in it."""
+        """Returns whether M differs from zero; another drive's readings are unrelated."""
         m = self.M.ravel()
         return float(m @ np.linalg.solve(self.covariance, m)) > LIMIT
 
 
-class Found(NamedTuple):
-    """The fit, and what of it is the matrix."""
+class MatrixFit(NamedTuple):
+    """A fit, and which of its unknowns are the matrix."""
 
     fit: Fit
     matrix: Matrix
@@ -97,7 +100,7 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Explained:
-    """What is expected if this is the fault."""
+    """The matrices that are expected with a fault."""
 
     name: str
     words: str
@@ -106,28 +109,29 @@ class Explained:
 
     @property
     def F(self) -> Floats:
-        """The axes of the one of both that is not as it should be."""
+        """Returns the axes of the sensor that is wrong."""
         return self.of_turn if np.allclose(self.of_force, np.eye(3)) else self.of_force
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Of the rates of turn, and of the specific force."""
+    """The measured matrices of the rates of turn and of the specific force."""
 
     turn: Matrix
     force: Matrix
-    usual_force: float  # the median of its size, in the unit in which it is given
+    usual_force: float  # median of its size, in the given unit
 
     def held_against(self, why: Explained) -> float:
-        """d^2 of both together."""
+        """Returns d^2 of both matrices together."""
         return self.turn.held_against(why.of_turn) + self.force.held_against(why.of_force)
 
 
 def measured(
-    recording: Recording, seen: Seen, body: ImuBody, breaks_s: Floats = NO_BREAKS
+    recording: Recording, seen: CameraMotion, body: ImuBody, breaks_s: Floats = NO_BREAKS
 ) -> Measured | None:
-    """At the clock's offset at which the turns fit best. None with too little to tell by. At
-    `breaks_s` another stretch begins.
+    """Measures both matrices, at the clock offset at which the turns fit best.
+
+    None with too few data. A stretch begins at each of `breaks_s`.
     """
     t_ns = recording.frame_t_ns
     at_offsets = {0.0: _turn(body, seen, t_ns, 0.0)}
@@ -159,7 +163,7 @@ def measured(
     )
     good = seen.usable & np.isfinite(told[0].turn).all(axis=1) & np.isfinite(X).all(axis=(0, 2, 3))
     beside = [BIAS_MPS2] * 3 + [LEVER_M] * 3 + [100.0] * stretches.shape[2]
-    one, other = X[:, good]  # of the readings, each with a noise of its own
+    one, other = X[:, good]  # of the readings, each with its own noise
     noise = np.sqrt(0.5) * (one - other)[:, :, :9]
     at = np.flatnonzero(good)
     fit = _fit(seen.rates[at, :3], one, other, noise, seen.variance[at, :3], beside, at)
@@ -168,22 +172,24 @@ def measured(
 
 
 def _halves(readings: Inertial) -> list[NDArray[np.intp]]:
-    """Every other reading, and the rest, both from the first to the last: they show the same
-    motion, with noises of their own.
-    """
+    """Returns the odd and the even readings: the same motion with independent noise."""
     ends = 0, len(readings.t_ns) - 1
     return [np.union1d(ends, np.arange(k, ends[1], 2)) for k in (0, 1)]
 
 
 def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
-    """The images' own as the gyro has them: what both are off by would look like a lever."""
+    """Returns the images' turns in the gyro's axes: a common error would look like a lever."""
     return np.asarray(w @ fit.x[:9].reshape(3, 3).T + fit.x[9:])
 
 
-def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Found | None:
-    """By what the images tell otherwise, by the other half of the points and by the frames beside:
-    in that there is nothing of what a gyro reads without turning, be it noise or a motor. What
-    they do not tell of the readings counts as noise.
+def _turn(
+    body: ImuBody, seen: CameraMotion, frame_t_ns: np.ndarray, offset_s: float
+) -> MatrixFit | None:
+    """Fits the gyro's matrix, with instruments from the images.
+
+    They are the other half of the points and the neighbouring frames, which are free of what a gyro
+    reads without turning, be it noise or a motor. What they do not explain of the readings counts
+    as noise.
     """
     w, beside = body.mean_turns(frame_t_ns, offset_s), seen.beside()[:, 3:]
     good = seen.usable & np.isfinite(np.hstack((w, beside))).all(axis=1)
@@ -197,34 +203,36 @@ def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) ->
 
 
 def _are_silent(y: Floats, w: Floats, beside: Floats) -> bool:
-    """Whether the readings have no part in what the images show."""
+    """Returns whether the readings are unrelated to what the images show."""
     seen_to_turn = _together(y, beside)
-    return seen_to_turn > max(TURNS_SIGMAS, PART_LEAST * _together(w, _foretold(w, _told(beside))))
+    return seen_to_turn > max(
+        TURNS_SIGMAS, PART_LEAST * _together(w, _predicted(w, _with_bias(beside)))
+    )
 
 
-def _told(own: Floats) -> Floats:
-    """With a bias."""
+def _with_bias(own: Floats) -> Floats:
+    """Returns the rates with a column for the bias."""
     return np.hstack((own, np.ones((len(own), 1))))
 
 
 def _rows(
-    own: Seen, w: Floats, others: list[Motions], silent: bool
+    own: CameraMotion, w: Floats, others: list[Motions], silent: bool
 ) -> tuple[Floats, Floats, Floats, Floats, Indices]:
-    """y, X, Z, the variance and when. Of silent readings 0 is what they say."""
+    """Returns y, X, Z, the variance and the frames. Unrelated readings count as 0."""
     instruments = np.hstack([other.rates[:, 3:] for other in others])
     at = np.flatnonzero(own.usable & np.isfinite(np.hstack((w, instruments))).all(axis=1))
-    w, told = w[at], _told(_within(instruments[at]))
+    w, told = w[at], _with_bias(_within(instruments[at]))
     expected = w if silent else told @ np.linalg.lstsq(told, w, rcond=None)[0]
     return own.rates[at, 3:], _columns(w), _columns(expected), own.variance[at, 3:], at
 
 
 def _within(x: Floats) -> Floats:
-    """Half of the points may tell leaps."""
+    """Limits the rates by quantiles, for half of the points may give leaps."""
     return np.asarray(np.clip(x, *np.quantile(x, WITHIN, axis=0)))
 
 
 def _columns(w: Floats) -> Floats:
-    """(k, 3, 12) of M row by row, and of a bias."""
+    """Returns (k, 3, 12), the columns of M row by row, and of a bias."""
     X = np.zeros((len(w), 3, 12))
     for i in range(3):
         X[:, i, 3 * i : 3 * i + 3] = w
@@ -232,8 +240,8 @@ def _columns(w: Floats) -> Floats:
     return X
 
 
-def _foretold(w: Floats, told: Floats) -> Floats:
-    """By what goes with it in the other half of the drive."""
+def _predicted(w: Floats, told: Floats) -> Floats:
+    """Returns the rates as predicted by a fit in the other half of the drive."""
     half = len(w) // 2
     first, second = (np.linalg.lstsq(told[k], w[k], rcond=None)[0] for k in
                      (slice(half), slice(half, None)))  # fmt: skip
@@ -241,7 +249,7 @@ def _foretold(w: Floats, told: Floats) -> Floats:
 
 
 def _together(a: Floats, b: Floats) -> float:
-    """By how many standard errors two motions (k, 3) go together."""
+    """Returns by how many standard errors two motions (k, 3) correlate."""
     product = np.sum((a - a.mean(axis=0)) * (b - b.mean(axis=0)), axis=1)
     sums = np.bincount(np.arange(len(product)) * BLOCKS // len(product), product)
     return float(np.sum(sums) / (np.sqrt(BLOCKS) * np.std(sums) + 1e-12))
@@ -255,22 +263,26 @@ def _fit(
     variance: Floats,
     beside: list[float],
     at: Indices,
-) -> Found:
-    """By their own noise, where the drive does not move them, least squares would find a matrix of
-    0, and be sure of it.
+) -> MatrixFit:
+    """Fits a matrix with instruments.
+
+    By their own noise, where the drive has no motion, least squares would find a zero matrix with a
+    small standard error.
     """
     prior = np.diag(np.array([MATRIX] * 9 + beside) ** -2.0)
     fit = Fit(Design(y, X, Z, variance, prior, y, at), BLOCKS)
     by_readings = np.sum([fit.covariance_of(part)[:9, :9] for part in np.moveaxis(noise, 2, 0)], 0)
-    return Found(fit, Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9], by_readings))
+    return MatrixFit(fit, Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9], by_readings))
 
 
 # --- what explains it -----------------------------------------------------------------------------
 
 
 def explained(found: Measured, R_CB: Floats) -> Explained | None:
-    """The simplest that fits; None if all is as it should be. `name` is "no-fit" if nothing does,
-    and "turned" for a rotation of no name, which is then `of_turn`.
+    """Returns the simplest explanation that fits; None if nothing is wrong.
+
+    `name` is "no-fit" if nothing fits, and "turned" for a rotation without a name, which is in
+    `of_turn`.
     """
     none = Explained("", "", np.eye(3), np.eye(3))
     kinds = (_units, _Inverted(R_CB), _of_both, _of_one, _turned, _of_each, _scaled)
@@ -285,7 +297,7 @@ def explained(found: Measured, R_CB: Floats) -> Explained | None:
 
 
 def _units(found: Measured) -> Iterator[Explained]:
-    """In another unit gravity is another number: where forces are 9.8 on average it is theirs."""
+    """Yields other units by the median force: in another unit gravity is another number."""
     none = np.eye(3)
     for (turn, of_turn), (force_, of_force) in product(TURN_UNITS.items(), FORCE_UNITS.items()):
         words = "; ".join(w for w in (of_turn, of_force) if w)
@@ -301,7 +313,7 @@ def _units(found: Measured) -> Iterator[Explained]:
 
 
 class _Inverted:
-    """By this extrinsic."""
+    """An extrinsic that is given inverted."""
 
     def __init__(self, R_CB: Floats) -> None:
         self.Q = R_CB.T @ R_CB.T
@@ -311,7 +323,7 @@ class _Inverted:
 
 
 def _of_both(_: Measured) -> Iterator[Explained]:
-    """A frame that is turned or mirrored, and columns that are swapped as they stand."""
+    """Yields explanations for both sensors: a turned or mirrored frame, and swapped columns."""
     for F in ways():
         yield Explained("axes", "gyro and accelerometer have", np.linalg.det(F) * F, F)
         yield Explained("axes", "gyro and accelerometer have", F, F)
@@ -331,7 +343,7 @@ def _of_each(found: Measured) -> Iterator[Explained]:
 
 
 def _scaled(found: Measured) -> Iterator[Explained]:
-    """Off by any factor."""
+    """Yields explanations by any factor."""
     none = np.eye(3)
     of_turn, of_force = (float(np.trace(m.M)) / 3 for m in (found.turn, found.force))
     words = (
@@ -342,7 +354,7 @@ def _scaled(found: Measured) -> Iterator[Explained]:
 
 
 def _turned(found: Measured) -> Iterator[Explained]:
-    """The rotation of both that fits best."""
+    """Yields the rotation of both sensors that fits best."""
     for F in ways():
         if np.linalg.det(F) > 0:
             Q = _nearest(found, F)
@@ -350,7 +362,7 @@ def _turned(found: Measured) -> Iterator[Explained]:
 
 
 def _nearest(found: Measured, Q: Floats) -> Floats:
-    """Gauss and Newton from Q on."""
+    """Returns the rotation that fits best, by Gauss-Newton from Q."""
     matrices = [found.turn, found.force]
     known = [np.linalg.inv(m.covariance + m.by_readings + DOUBT**2 * np.eye(9)) for m in matrices]
     for _ in range(ROUNDS):

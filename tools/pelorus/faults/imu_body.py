@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""What an IMU says of the body's motion, and what may be wrong with it. With f the velocity that
-the specific force gives within a stretch but for its start and for gravity (pelorus.faults.force):
+"""The body's motion by an IMU, and its derivatives by what may be wrong with it.
+
+f is the velocity by the specific force within a stretch, without its start and gravity
+(pelorus.faults.force):
 
     w = a w_B - b_w + phi x w_B + dt w_B'
     v = s g - b_a.. + phi x g + w_B x dr + dt g',      g = f + R' (V + g t) + w_B x r
 
-A baseline that is off is s; a focal length changes turns and ways as the images tell themselves.
+A wrong baseline is s; a wrong focal length changes turns and displacements of the images.
 """
 
 from __future__ import annotations
@@ -30,58 +32,64 @@ from pelorus.faults.fit import (
     joined,
 )
 from pelorus.faults.force import Force, by_gyro, force, mean_rates, rates_of_turn, thinned
-from pelorus.faults.seen import Motions, Seen, slope
+from pelorus.faults.seen import CameraMotion, Motions, slope
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 Flags = NDArray[np.bool_]
-START_MPS, GRAVITY_MPS2 = 100.0, 100.0  # sigmas of what a stretch begins with
-GYRO_SCALE = 0.005  # sigma: better than a focal length is known without it
+START_MPS, GRAVITY_MPS2 = 100.0, 100.0  # sigmas of the start of a stretch
+GYRO_SCALE = 0.005  # sigma: no focal length is known better without it
 
 
 class ImuBody:
-    """What the readings say of the motion between frames."""
+    """The motion between frames by the readings of an IMU."""
 
-    def __init__(self, recording: Recording, seen: Seen) -> None:
+    def __init__(self, recording: Recording, seen: CameraMotion) -> None:
         self.readings = thinned(_until(recording))
         self.attitudes = by_gyro(self.readings, np.zeros(3))
         self._set_bias(recording.frame_t_ns, seen)
 
-    def _set_bias(self, frame_t_ns: NDArray[np.int64], seen: Seen) -> None:
-        """Of the gyro, as far as the images tell it: the middle of what both differ by."""
+    def _set_bias(self, frame_t_ns: NDArray[np.int64], seen: CameraMotion) -> None:
+        """Corrects the gyro's attitudes by the bias against the images: their median difference."""
         off = self.turns(frame_t_ns, 0.0) - seen.rates[:, 3:]
         bias = np.nanmedian(off[seen.usable], axis=0)
         if np.isfinite(bias).all():
             self.attitudes = by_gyro(self.readings, bias)
 
     def force(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Force:
-        """If the frames were later by so much."""
+        """Returns the mean velocities between frames that are `offset_s` later."""
         return force(self.readings, self.attitudes, self.frame_s(frame_t_ns, offset_s))
 
     def frame_s(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
         return np.asarray((frame_t_ns - self.readings.t_ns[0]) * 1e-9 + offset_s)
 
     def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
-        """As fit.Body."""
+        """Returns the mean rates between frames, as fit.Body."""
         return rates_of_turn(self.readings, self.attitudes, self.frame_s(frame_t_ns, offset_s))
 
     def mean_turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
-        """(k, 3) the readings' own means from frame to frame: `turns` but for the order of turns,
-        and right in any unit, where a turn by degrees taken for radians goes round several times.
+        """Returns (k, 3) the readings' own means from frame to frame.
+
+        They are `turns` but for the order of turns, and right in any unit: degrees taken for
+        radians go round several times.
         """
         frame_s = self.frame_s(frame_t_ns, offset_s)
         return mean_rates(self.readings, frame_s)
 
-    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
-        """As fit.Body."""
+    def design(
+        self, recording: Recording, seen: CameraMotion, offset_s: float, bias: float
+    ) -> Design:
+        """Returns the design of the usable pairs, as fit.Body."""
         told = self.force(recording.frame_t_ns, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
         return joined(*(_design(told, arm, own, others, bias) for own, others in seen.pairs()))
 
 
-def _design(told: Force, arm: Floats, seen: Seen, others: list[Motions], bias: float) -> Design:
-    """`others` are the instruments."""
+def _design(
+    told: Force, arm: Floats, seen: CameraMotion, others: list[Motions], bias: float
+) -> Design:
+    """Returns the design; `others` are the instruments."""
     stretches = told.of_stretches()
     g = told.way + np.cross(told.turn, arm)
     good = seen.usable & np.isfinite(told.turn).all(axis=1)
@@ -105,7 +113,7 @@ def _instruments(told: Force, stretches: Floats, z: Motions) -> Floats:
 
 
 def _columns(told: Force, stretches: Floats, both: Floats, by_time: Floats) -> Floats:
-    """(k, 6, m): what each unknown adds to a motion (v, w) and its slope."""
+    """Returns (k, 6, m) what each unknown adds to a motion (v, w) and its slope."""
     g, w = both[:, :3], both[:, 3:]
     X = np.zeros((len(g), 6, PARAMETERS + stretches.shape[2]))
     X[:, :3, SCALE] = g
@@ -122,7 +130,7 @@ def _columns(told: Force, stretches: Floats, both: Floats, by_time: Floats) -> F
 
 
 def _until(recording: Recording) -> Inertial:
-    """The readings that the frames need."""
+    """Returns the readings that the frames need."""
     readings = recording.inertial
     numbers = np.hstack((readings.a_B_mps2, readings.w_B_radps))
     finite: Flags = np.asarray(np.isfinite(numbers).all(axis=1), np.bool_)
@@ -134,14 +142,14 @@ def _until(recording: Recording) -> Inertial:
 
 
 def _start(y: Floats, X: Floats, variance: Floats) -> Floats:
-    """What the stretches begin with, robustly, as if all else were right."""
+    """Returns the starts of the stretches, fitted robustly as if all else were right."""
     sigma = np.resize([START_MPS] * 3 + [GRAVITY_MPS2] * 3, X.shape[2])
     fit = Fit(Design(y, X, X, variance, np.diag(sigma**-2), y, np.arange(len(y))))
     return fit.x
 
 
 def _prior(bias: float, starts: int) -> Floats:
-    """Inverse variances: all but the accelerometer's bias are hardly known."""
+    """Returns inverse variances: nothing but the accelerometer's bias is known beforehand."""
     sigma = np.full(PARAMETERS + starts, 10.0)
     sigma[BIAS : BIAS + 3] = bias
     sigma[LEVER : LEVER + 3] = 3.0

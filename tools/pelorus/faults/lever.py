@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Lever: the extrinsic's translation is not t_CB but the camera's position in the body.
+"""Detects an extrinsic whose translation is the camera's position in the body instead of t_CB.
 
-A matrix [R | p_BC] looks like an extrinsic; right is [R | -R p_BC]. Turns tell: with the turn R_C
-and the way p_C of the camera over some frames, and the way of the body from the twists,
+A matrix [R | p_BC] looks like an extrinsic; right is [R | -R p_BC]. Turns show it: with the turn
+R_C and the displacement p_C of the camera over some frames, and that of the body by the twists,
 
     p_C = (I - R_C) t_CB + R_CB p_back          (coordinates in camera k -> camera k + lag)
 
-R_C and p_C come from the images alone, since a gyro may be noisy or biased. Along the line from
-t (s = 0) to -R t (s = 1), s is the first unknown of a robust regression over all frames; five more
-take up what else moves p_C in a turn: twists that come late, a scale of the way, and three small
-angles of the mounting. Remedy where s is nearer to 1 beyond doubt: t_CB = -R t.
+R_C and p_C come from the images alone, since a gyro may be noisy or biased. Along the line from t
+(s = 0) to -R t (s = 1), s is the first unknown of a robust regression over all frames; five more
+cover what else moves p_C in a turn: twists that come late, a scale of the way, and three small
+angles of the mounting. Remedy where s is significantly nearer to 1: t_CB = -R t.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pelorus import visual_motion
 from pelorus.faults.finding import Finding
-from pelorus.faults.likelihood import of_estimate, told
+from pelorus.faults.likelihood import of_estimate, with_ratio
 from pelorus.frames import TwistTiming
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -28,15 +28,16 @@ from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
 
 SUBJECT = "lever of the extrinsic"
 LAG = 3
-SIGMAS_MIN = 3.0  # s must exceed one half by so many of its own standard deviations
-MARGIN_MIN = 0.08  # and by so much: cars' velocities are not quite those of the point they name
-SEPARATED_MIN_M = 0.03  # hypotheses that never part farther cannot be told apart
+SIGMAS_MIN = 3.0  # standard deviations by which s must exceed one half
+# and by so much: cars slip, and their velocities are not quite those of one point
+MARGIN_MIN = 0.08
+SEPARATED_MIN_M = 0.03  # hypotheses that never differ more cannot be separated
 REWEIGHTINGS = 20
 RIDGE = 1e-9  # keeps a column that the drive does not excite solvable
 
 
 def mend(recording: Recording) -> tuple[Recording, Finding]:
-    """Replace t by -R t if the turns say so."""
+    """Replaces t by -R t if the turns show that it is needed."""
     camera = recording.header.camera
     given = recording.T_CB
     other = Poses(given.R, -given.R @ given.p)
@@ -50,7 +51,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         evidence = (
             f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are expected"
         )
-        return recording, Finding(SUBJECT, False, evidence, "left as given", told=False)
+        return recording, Finding(SUBJECT, False, evidence, "left as given", is_conclusive=False)
     way = _way(recording, seen_motion.R, given)
     columns = _columns(recording, seen_motion.R, way, apart)
     s, sigma = _regress(seen_motion.p[usable] - way[usable], columns[usable])
@@ -63,7 +64,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"reprojection in {int(turning.sum())} turning frames is {errors[0]:.1f} and "
         f"{errors[1]:.1f} px"
     )
-    evidence = told(evidence, of_estimate(s, 0.0, 1.0, sigma))
+    evidence = with_ratio(evidence, of_estimate(s, 0.0, 1.0, sigma))
     if s - 0.5 < max(SIGMAS_MIN * sigma, MARGIN_MIN):
         return recording, Finding(SUBJECT, False, evidence, "nothing to mend")
     action = f"t_CB {_metres(given.p)} replaced by {_metres(other.p)}"
@@ -71,12 +72,12 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
 
 
 def _way(recording: Recording, R_C: Floats, T_CB: Poses) -> Floats:
-    """p_C of each k from the images' turn, the twists' way and this lever."""
+    """Returns p_C of each k from the images' turn, the twists' displacement and this lever."""
     return np.asarray(T_CB.p - R_C @ T_CB.p + recording.body_motion(LAG).p @ T_CB.R.T)
 
 
 def _columns(recording: Recording, R_C: Floats, way: Floats, apart: Floats) -> Floats:
-    """(frames, 3, 6): how p_C changes with s and with what else may be amiss."""
+    """Returns (frames, 3, 6) the derivatives of p_C by s and by the other unknowns."""
     T_CB = recording.T_CB
     early, late = (
         _way(recording.with_header(twist_timing=timing), R_C, T_CB)
@@ -88,7 +89,7 @@ def _columns(recording: Recording, R_C: Floats, way: Floats, apart: Floats) -> F
 
 
 def _regress(offset: Floats, columns: Floats) -> tuple[float, float]:
-    """offset = columns x + noise, by rows of metres: x_0 and its standard deviation.
+    """Returns x_0 of offset = columns x + noise, and its standard deviation.
 
     Weights as of Geman and McClure; the windows overlap LAG-fold, so the variance is LAG times
     that of independent ones.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much likelier what is seen is with a fault than without: 2 ln of the ratio of likelihoods.
+"""2 ln of the likelihood ratio of the data with a fault and without.
 
 What is read off a file, and not estimated, has none: stamps that go back, pictures that repeat bit
 for bit, twists that are all zero.
@@ -11,20 +11,22 @@ import numpy as np
 
 
 def of_estimate(x: float, given: float, other: float, sigma: float) -> float:
-    """Of a number whose value is `given` without the fault and `other` with it."""
+    """Returns the ratio of an estimate that is `given` without the fault, `other` with it."""
     return ((x - given) ** 2 - (x - other) ** 2) / (sigma**2 + 1e-12)
 
 
 def of_share(share: float, count: float, usual: float) -> float:
-    """Of `count` that are independent this share, where `usual` is the most without the fault;
-    0 if it is no more (Wilks 1938).
+    """Returns the ratio of a share of `count` independent events, `usual` at most without the
+    fault.
+
+    It is 0 if the share is no larger than that (Wilks 1938).
     """
     if not usual < share <= 1:
         return 0.0
     parts = ((share, usual), (1 - share, 1 - usual))
-    return 2 * count * sum(p * float(np.log(p / due)) for p, due in parts if p > 0)
+    return 2 * count * sum(p * float(np.log(p / expected)) for p, expected in parts if p > 0)
 
 
-def told(words: str, ratio: float | None) -> str:
-    """The words, and the ratio where there is one."""
+def with_ratio(words: str, ratio: float | None) -> str:
+    """Returns the words, with the ratio where there is one."""
     return words if ratio is None else f"{words} (2 ln of the likelihood ratio: {ratio:.0f})"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All examinations in the order in which they build on each other."""
+"""All examinations, in the order in which they build on each other."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"
 CANNOT = "what is off by less than four times as much cannot be seen in this drive"
 BEHIND = "before that is mended this drive cannot tell scale, clock and the camera's place"
-SCALE_TOLD = 0.02  # sigma of the scale, above which a drive says little of it
+SCALE_TOLD = 0.02  # sigma of the scale above which a drive shows little of it
 
 
 def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """Find and mend what the recording's own data give away.
+    """Finds and mends what the recording's own data show to be wrong.
 
-    Tracks come first, for the others measure with them; axes before the lever, which takes the
-    way of the camera from the twists.
+    Tracks come first, for the others measure with them; axes come before the lever, which uses the
+    body's displacement by the twists.
     """
     findings = []
     for examine in (stale.mend, axes.mend, lever.mend):
@@ -40,14 +40,15 @@ def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
 def held_to_fit(
     given: Recording, mended: Recording, findings: Sequence[Finding]
 ) -> tuple[Recording, list[Finding]]:
-    """The absolute test. An extrinsic that was changed stays so only if all fits with it; and what
-    is wrong besides is told by name.
+    """Returns the mended recording if all fits with it, else the given one; names the other faults.
+
+    A changed extrinsic is kept only so.
     """
     found = judged(mended)
     if mended.tracks is not given.tracks and any(
         fault.name == NOTHING_LASTS for fault in found.faults
     ):
-        # pictures that stand still, not single tracks
+        # frozen pictures, not single stale tracks
         mended = replace(mended, tracks=given.tracks)
         findings = [_taken_back(finding, found.faults[0], stale.SUBJECT) for finding in findings]
         found = judged(mended)
@@ -58,20 +59,20 @@ def held_to_fit(
         findings = [_taken_back(f, wrong[0], axes.SUBJECT, lever.SUBJECT) for f in findings]
         mended = mended.with_extrinsic(given.T_CB)
         found = judged(mended)
-    return mended, [*findings, *_known(found), *(_told(fault) for fault in found.faults)]
+    return mended, [*findings, *_known(found), *(_as_finding(fault) for fault in found.faults)]
 
 
 def _known(found: Judged) -> Iterator[Finding]:
-    """How well the drive tells what it was asked, so that silence is not taken for a promise."""
+    """Yields how well the drive shows what was examined: silence is no promise."""
     if found.agreed is not None:
-        told = found.agreed.scale_sigma < SCALE_TOLD
-        yield Finding(AGREES, False, known_words(found.agreed), CANNOT, told=told)
+        is_enough = found.agreed.scale_sigma < SCALE_TOLD
+        yield Finding(AGREES, False, known_words(found.agreed), CANNOT, is_conclusive=is_enough)
     elif any(fault.stops for fault in found.faults):
-        yield Finding(AGREES, False, BEHIND, "nothing was changed", told=False)
+        yield Finding(AGREES, False, BEHIND, "nothing was changed", is_conclusive=False)
 
 
 def known_words(agreed: Agreement) -> str:
-    """What the drive tells of camera and body, and how well."""
+    """Returns in words what the drive shows of camera and body, and how well."""
     place_m = np.sqrt(np.diagonal(agreed.lever_covariance))
     place = f"to {place_m.max():.2f} m"
     if place_m.max() > PLACE_TOLD_M:
@@ -89,13 +90,13 @@ def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
     if finding.subject not in subjects or not finding.found:
         return finding
     action = f"left as given: even then it would not fit ({because.words})"
-    return replace(finding, told=False, found=False, action=action)
+    return replace(finding, is_conclusive=False, found=False, action=action)
 
 
-def _told(fault: Fault) -> Finding:
+def _as_finding(fault: Fault) -> Finding:
     if fault.name == UNTOLD:
-        return Finding(AGREES, False, fault.told, "nothing was changed", told=False)
+        return Finding(AGREES, False, fault.sentence, "nothing was changed", is_conclusive=False)
     action = "nothing was changed; the filter can live with it, and pelorus check tells more"
     if fault.grave:
         action = "nothing was changed: mend it where the data or the calibration come from"
-    return Finding(fault.name, True, fault.told, action)
+    return Finding(fault.name, True, fault.sentence, action)

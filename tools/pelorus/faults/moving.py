@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How much of what is seen moves by itself?
+"""Measures how many of the seen points move by themselves.
 
-Most points tell one motion of the camera. Seen again some frames later, a point of the world is
-where that motion puts it, or a bad match was anywhere, once; a point that moves is off, in most of
-its views, and the farther the longer it is watched.
+Most points show one motion of the camera. Seen again some frames later, a point of the world is
+where that motion puts it, and a bad match is off once. A point that moves is off in most of its
+views, and the more the longer it is watched.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from pelorus.frames import Camera
 from pelorus.tracks import Tracks
 
 FAR_LAG = 3  # frames
-OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 sound pairs
-DRIFT_PX = 1.5  # a tracker may lose its point by so much between the views
-VIEWS_LEAST = 4  # pairs of a track that tell
+OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 inliers
+DRIFT_PX = 1.5  # allowed drift of a tracker between the views
+VIEWS_LEAST = 4  # pairs that a track needs
 MOST_OF_THEM = 0.5
 TRACKS_LEAST = 10
 MAD_TO_SIGMA, NOISE_LEAST, DRIFTS_ABOVE = 1.4826, 0.5, 1.5
 SHARE_LEAST = 0.14
-USUAL, USUAL_SIGMAS = 0.12, 2.3  # on roads 5 to 12 % drives, or is tracked so badly
+USUAL, USUAL_SIGMAS = 0.12, 2.3  # on roads 5 to 12 % drive, or are tracked as badly
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Of so many tracks that were long enough this share moves."""
+    """The share of moving tracks among those that are long enough."""
 
     tracks: int
     share: float
 
     @property
     def least(self) -> float:
-        """The share above which it is more than usual; of few tracks chance makes up some."""
+        """Returns the share above which it is more than usual; few tracks allow for chance."""
         by_chance = USUAL_SIGMAS * float(np.sqrt(USUAL / max(self.tracks, 1)))
         return max(SHARE_LEAST, USUAL + by_chance)
 
@@ -46,7 +46,7 @@ class Moving:
 
 
 def moving(tracks: Tracks, camera: Camera, near: TwoViews) -> Moving:
-    """`near` of neighbouring frames."""
+    """Counts the moving tracks; `near` are views of neighbouring frames."""
     far = two_views(tracks, camera, FAR_LAG)
     _, number = np.unique(tracks.id, return_inverse=True)
     count = int(number.max()) + 1 if len(number) else 0
@@ -57,14 +57,16 @@ def moving(tracks: Tracks, camera: Camera, near: TwoViews) -> Moving:
     long = views >= VIEWS_LEAST
     if long.sum() < TRACKS_LEAST:
         return Moving(int(long.sum()), 0.0)
-    # by views, so that what is seen for long weighs as much as it does in a filter
+    # by views, so that a long track counts as much as it does in a filter
     moves = long & (off > MOST_OF_THEM * views)
     return Moving(int(long.sum()), float(views[moves].sum() / views[long].sum()))
 
 
 def _noise(tracks: Tracks, near: TwoViews, far: TwoViews) -> float:
-    """Of the pixels, in units of the far views' own, which what moves has widened: rows of the left
-    and the right picture tell it at one moment. Not where all tracks drift, which rows do not tell.
+    """Returns the pixel noise in units of the far views' own, which moving points have widened.
+
+    It comes from the difference of left and right rows in one frame. Where all tracks drift it is
+    1, for rows do not show drift.
     """
     if far.sigma_px > DRIFTS_ABOVE * near.sigma_px:
         return 1.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Everyday faults, by name: what is most likely wrong with a recording, and how to put it right.
+"""Names everyday faults: what is most likely wrong with a recording, and how to mend it.
 
 An absolute test comes first: one rigid scene must explain the points of two frames, and one
 rotation and scale the motions of camera and body. Where that fails nothing is called good, and
@@ -22,7 +22,7 @@ from pelorus.faults.handeye import first_part
 from pelorus.faults.likelihood import of_share
 from pelorus.faults.moving import Moving, moving
 from pelorus.faults.resolution import of_resolution
-from pelorus.faults.seen import Seen, pauses
+from pelorus.faults.seen import CameraMotion, pauses
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
 from pelorus.inertial_survey import longest_run, readings_of
@@ -31,21 +31,21 @@ from pelorus.recording import Recording
 
 Flags = NDArray[np.bool_]
 SWAPPED_SHARE = 0.5
-ROW_GAP_PX = 2.0  # of a rectified pair the median is below one
-ROW_BIN, ROW_BINS = 50, 4  # observations and parts of the picture by which rows are compared
+ROW_GAP_PX = 2.0  # a rectified pair has a median below one
+ROW_BIN, ROW_BINS = 50, 4  # observations, and parts of the picture, by which rows are compared
 ROW_OFF_PX = 1.0
-OF_MEDIAN = 1.858  # standard error of a median of n, times root n, beside the median deviation
+OF_MEDIAN = 1.858  # standard error of a median of n, times root n, relative to the median deviation
 FROZEN_FRAMES = 3
 MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
 GAP_TIMES = 10.0
-GAP_WAY = 0.02  # of all the way, what may be gone in gaps of twists or readings
+GAP_WAY = 0.02  # share of the way that may be missing in gaps of twists or readings
 FROM_TIMES, SPANS_APART = 10, 50.0
 TWISTS, READINGS, FRAMES = "twists", "readings", "frames"
 USUAL_MOST_NS, USUAL_LEAST_NS = 20e9, {TWISTS: 5e4, READINGS: 2e4, FRAMES: 5e5}
 
 
 def judged_of(messages: Sequence[Message], recording: Recording) -> Judged:
-    """Of a file's messages, times as they stand, and of what a filter would take of them."""
+    """Examines a file's times as they are, and the recording that a filter would use."""
     frames = np.array([m.t_ns for m in messages if isinstance(m, Stereo)], np.int64)
     if len(recording.inertial.t_ns):
         imu = [m for m in messages if isinstance(m, Imu)]
@@ -56,12 +56,12 @@ def judged_of(messages: Sequence[Message], recording: Recording) -> Judged:
 
 
 def faults_in(recording: Recording) -> list[Fault]:
-    """Of a recording that is not written yet."""
+    """Returns the faults of a recording that is not written yet."""
     return judged(recording).faults
 
 
 def judged(recording: Recording) -> Judged:
-    """The same, and how well it is known."""
+    """Returns the faults, and how well they are known."""
     frames = recording.frame_t_ns
     if len(recording.inertial.t_ns):
         return _judged({READINGS: recording.inertial.t_ns, FRAMES: frames}, recording)
@@ -69,13 +69,13 @@ def judged(recording: Recording) -> Judged:
 
 
 def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
-    """What spoils the result first, then the likeliest; empty if nothing is known to be wrong."""
+    """Returns the faults, if any: first what spoils the result, then by likelihood."""
     times = [fault for name, t_ns in times_ns.items() for fault in _times(name, t_ns)]
     times += _spans(*times_ns.items())
     short = first_part(recording)
     pixels = list(of_resolution(short)) or _of_pair(short)
     if pixels or any(fault.name in ("time-unit", "time-apart") for fault in times):
-        return Judged([*pixels, *times])  # what follows would be built on sand
+        return Judged([*pixels, *times])  # what follows would build on it
     views = two_views(short.tracks, short.header.camera, 1)
     moved = cache(lambda: moving(short.tracks, short.header.camera, views))
     ids = list(_ids(short, views, moved))
@@ -114,15 +114,17 @@ def _times(name: str, t_ns: Times) -> Iterator[Fault]:
 
 
 def _beside_way(fault: Fault, recording: Recording, views: TwoViews, t_ns: Times) -> Fault:
-    """A gap while the robot stands is no harm: many an odometry is published only while it moves.
-    By the images, as far as they are looked at; t_ns are the times of what moves the body.
+    """Returns the fault, made harmless if the robot stands in the gap.
+
+    Many odometry drivers publish only while the robot moves. The images show it, as far as they are
+    examined; t_ns are the times of the twists or readings.
     """
     frames = recording.frame_t_ns
     if fault.name != "time-gap" or f"gaps in the {FRAMES}" in fault.words:
         return fault
     if len(t_ns) < 2 or t_ns[np.argmax(np.diff(t_ns)) + 1] > frames[-1]:
         return fault
-    seen = Seen.of(recording, views)
+    seen = CameraMotion.of(recording, views)
     within = pauses(t_ns, frames[:-1], frames[1:])
     way = np.where(seen.usable[:, None], seen.rates[:, :3], 0.0) * seen.tau_s[:, None]
     which = np.cumsum(np.diff(within, prepend=False) & within)
@@ -138,7 +140,7 @@ def _beside_way(fault: Fault, recording: Recording, views: TwoViews, t_ns: Times
 
 
 def _spans(body: tuple[str, Times], camera: tuple[str, Times]) -> Iterator[Fault]:
-    """Both streams are of one drive: of like length, and of the same time."""
+    """Yields a fault if the streams differ in length or time, and so are not of one drive."""
     if min(len(body[1]), len(camera[1])) < FROM_TIMES:
         return
     lengths = [float(t_ns.max() - t_ns.min()) * 1e-9 for _, t_ns in (body, camera)]
@@ -154,7 +156,7 @@ def _spans(body: tuple[str, Times], camera: tuple[str, Times]) -> Iterator[Fault
 
 
 def _of_pair(recording: Recording) -> list[Fault]:
-    """What is wrong between left and right; moments that differ explain rows that do, too."""
+    """Returns faults between left and right; different moments also explain different rows."""
     wrong = list(_pixels(recording))
     if any(fault.name != "unrectified" for fault in wrong):
         return wrong
@@ -166,7 +168,7 @@ def _pixels(recording: Recording) -> Iterator[Fault]:
     u_l, v_l, u_r, v_r = recording.tracks.pixels.T
     disparity, rows = u_l - u_r, v_l - v_r
     gap = float(np.median(np.abs(rows)))
-    points = len(np.unique(recording.tracks.id))  # one of them is off alike in all its frames
+    points = len(np.unique(recording.tracks.id))  # each of them is off alike in all its frames
     if np.mean(disparity < 0) > SWAPPED_SHARE and gap < ROW_GAP_PX:
         yield Fault(
             "left-right",
@@ -191,8 +193,10 @@ def _pixels(recording: Recording) -> Iterator[Fault]:
 
 
 def _row_offset(recording: Recording, points: int) -> tuple[float, float]:
-    """RMS over parts of the picture of the rows' median difference, px; and 2 ln of the likelihood
-    of these medians beside that of none, by their spread over the points in a part.
+    """Returns the rows' error, px, and its likelihood ratio.
+
+    The first is the RMS over parts of the picture of the rows' median difference; the second is 2
+    ln of the ratio of these medians against none, by their spread over the points in a part.
     """
     px = recording.tracks.pixels
     rows = px[:, 1] - px[:, 3]
@@ -212,7 +216,7 @@ def _row_offset(recording: Recording, points: int) -> tuple[float, float]:
 
 
 def _ids(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> Iterator[Fault]:
-    """Ids that are a frame's row numbers, or slots, or never seen again."""
+    """Yields a fault if ids are a frame's row numbers, reused slots, or never seen again."""
     tracks = recording.tracks
     if not len(tracks.pairs(1).first):
         yield Fault("ids-new", "no id is seen in two frames in a row: ids must follow a point")
@@ -221,7 +225,7 @@ def _ids(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> 
         yield Fault("ids-rows", "the ids are 0, 1, 2, ... in every frame: they are row numbers")
         return
     found = identity.jumps(recording, views)
-    if found.are_slots and not moved().more_than_usual:  # fast ones seem to jump
+    if found.are_slots and not moved().more_than_usual:  # fast points seem to jump
         yield Fault(
             "ids-slots",
             f"{found.jumps} tracks go on with another point from one frame to the next, "
@@ -232,7 +236,7 @@ def _ids(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> 
 
 
 def _frozen(recording: Recording) -> Iterator[Fault]:
-    """The same picture several times in a row, though twists or gyro say that the body moves."""
+    """Yields a fault if the same picture repeats though twists or gyro show that the body moves."""
     pairs = recording.tracks.pairs(1)
     same = (recording.tracks.pixels[pairs.first] == recording.tracks.pixels[pairs.second]).all(1)
     count = np.bincount(pairs.frame, minlength=recording.tracks.frame_count)
@@ -253,7 +257,7 @@ def _frozen(recording: Recording) -> Iterator[Fault]:
 
 
 def _moves(recording: Recording) -> Flags:
-    """Whether the body moves from each frame to the next; with an IMU, whether it turns."""
+    """Returns whether the body moves from each frame to the next; with an IMU, whether it turns."""
     readings = recording.inertial
     if not len(readings.t_ns):
         return np.asarray(np.linalg.norm(recording.body_motion(1).p, axis=1) > MOVES_M)

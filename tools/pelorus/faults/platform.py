@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""When do an IMU and the pictures not tell the same motion?
+"""Finds when an IMU and the pictures show different motions.
 
-In a lift, a bus or a ship's cabin the pictures tell the motion in the cabin, the IMU that of the
-cabin, too. The pictures' change of velocity within a second, less what the readings add up to, is
-gravity at any time when both move alike; and the gyro's rates are the pictures'.
+In a lift, a bus or a ship's cabin the pictures show the motion in the cabin, the IMU also that of
+the cabin. The change of the pictures' velocity within a second, minus the integrated readings, is
+gravity whenever both move alike; and the gyro's rates equal the pictures'.
 """
 
 from __future__ import annotations
@@ -13,21 +13,23 @@ from numpy.typing import NDArray
 
 from pelorus.faults.force import seconds
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import CameraMotion
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 Flags = NDArray[np.bool_]
 WINDOW_S, USUAL_S, JOIN_S = 1.0, 20.0, 1.5
 SIGMAS, FORCE_MPS2, TURN_RADPS = 8.0, 0.3, 0.05
-MOST = 0.5  # of the drive: more is no matter of some time
-QUIET, QUIET_SIGMAS = 0.25, 1.10  # a quarter of three normal numbers is shorter than 1.10 sigma
+MOST = 0.5  # share of the drive: a longer disagreement is another fault
+# a quarter of vectors of three normal numbers is shorter than 1.10 sigma
+QUIET, QUIET_SIGMAS = 0.25, 1.10
 SHOWN = 4
 
 
-def disagreeing(recording: Recording, seen: Seen, body: ImuBody) -> Flags:
-    """(k,) whether the two tell different motions from frame k to k + 1; none where they do so for
-    most of the drive.
+def disagreeing(recording: Recording, seen: CameraMotion, body: ImuBody) -> Flags:
+    """Returns (k,) whether the two show different motions from frame k to k + 1.
+
+    It is False everywhere if they do so for most of the drive.
     """
     t = body.frame_s(recording.frame_t_ns, 0.0)
     middle = 0.5 * (t[1:] + t[:-1])
@@ -46,7 +48,7 @@ def disagreeing(recording: Recording, seen: Seen, body: ImuBody) -> Flags:
 
 
 def words(t_s: Floats, wrong: Flags) -> str:
-    """From when to when, of frames at these seconds."""
+    """Returns in words from when to when, for frames at these seconds."""
     parts = spans(t_s, wrong)
     told = [f"from {first:.0f} to {last:.0f} s" for first, last in parts[:SHOWN]]
     more = f" and {len(parts) - SHOWN} times more" if len(parts) > SHOWN else ""
@@ -54,7 +56,7 @@ def words(t_s: Floats, wrong: Flags) -> str:
 
 
 def spans(t_s: Floats, wrong: Flags) -> list[tuple[float, float]]:
-    """Begin and end of each stretch, those that follow each other closely as one."""
+    """Returns begin and end of each stretch; those that follow closely are joined."""
     out: list[tuple[float, float]] = []
     for k in np.nonzero(wrong)[0].tolist():
         first, last = float(t_s[k]), float(t_s[k + 1])
@@ -66,9 +68,14 @@ def spans(t_s: Floats, wrong: Flags) -> list[tuple[float, float]]:
 
 
 def _gravity(
-    recording: Recording, seen: Seen, body: ImuBody, middle: Floats, good: Flags, window: int
+    recording: Recording,
+    seen: CameraMotion,
+    body: ImuBody,
+    middle: Floats,
+    good: Flags,
+    window: int,
 ) -> Floats:
-    """(k, 3) in the axes of the first reading, as each window tells it, at its middle."""
+    """Returns (k, 3) gravity in the axes of the first reading, at the middle of each window."""
     t, R = seconds(body.readings), body.attitudes
     arm = -recording.T_CB.R.T @ recording.T_CB.p
     v_B = seen.rates[:, :3] - np.cross(seen.rates[:, 3:], arm)
@@ -90,7 +97,7 @@ def _gravity(
 
 
 def _smoothed(x: Floats, count: int) -> Floats:
-    """Means of so many values about each; NaN where most of them are."""
+    """Returns moving means of `count` values; NaN where most of them are."""
     known = np.isfinite(x).all(axis=1)
     ones = np.ones(2 * (count // 2) + 1)
     total = np.stack([np.convolve(np.where(known, c, 0.0), ones, "same") for c in x.T], axis=-1)
@@ -100,7 +107,7 @@ def _smoothed(x: Floats, count: int) -> Floats:
 
 
 def _outlying(x: Floats, t: Floats, least: float) -> Flags:
-    """Where it is off what is usual around it, by more than `least` and than chance."""
+    """Returns where x differs from its usual value nearby, by more than `least` and than chance."""
     usual = np.full_like(x, np.nan)
     for begin in np.arange(t[0], t[-1], USUAL_S / 4):
         near = np.abs(t - begin) < USUAL_S / 2

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Are the pixels those of the pictures for which the calibration was made?
+"""Detects pixels of another resolution than the calibration's.
 
-Pixels beyond the picture are not, if their middle is that of a larger picture, too: points that
-move and columns that were swapped also leave it. Where it has room for them, the picture that the
-pixels fill is compared with the one about the principal point: both its sides must be off by the
-same factor, and by one that a camera's modes or a resized picture have, for it to be another
-resolution.
+Pixels outside the picture show it if their centre is that of a larger picture, too: moving points
+and swapped columns also leave it. Where pixels fill only a part, it is compared with the picture
+about the principal point: for another resolution both sides must be off by the same factor, and by
+one that a camera's modes or a resized picture have.
 """
 
 from __future__ import annotations
@@ -19,17 +18,18 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 ROWS_LEAST = 1000
-BEYOND_PX, BEYOND_SHARE = 5.0, 0.01  # a tracker may predict a little beyond
-ENDS = (0.002, 0.998)  # quantiles: the picture that pixels fill, but for wild ones
+BEYOND_PX, BEYOND_SHARE = 5.0, 0.01  # a tracker may predict a little outside
+ENDS = (0.002, 0.998)  # quantiles of the pixels, without wild ones
 FACTORS = (1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0, 4.0)
-NEAR, ALIKE = 0.12, 0.12  # logarithms: to such a factor, and of one side beside the other
-BEGINS = 0.1  # of the side, where the pixels must begin
-# Nearer to the middle of the next larger picture (3/2) than to that of this one.
+# logarithms: distance to a factor, and of one side's factor to the other's
+NEAR, ALIKE = 0.12, 0.12
+BEGINS = 0.1  # share of the side within which the pixels must begin
+# Between the middle of this picture and that of the next larger one (3/2).
 MIDDLE_LEAST = (1 / 2 + 3 / 4) / 2
 
 
 def beyond(pixels: Floats, size: tuple[int, int]) -> str:
-    """What is wrong with pixels (n, 4) for a picture of that width and height; empty: nothing."""
+    """Returns what is wrong with pixels (n, 4) in a picture of that size; empty if nothing."""
     if not size[0] or not len(pixels):
         return ""
     outside = (pixels.reshape(-1, 2, 2) > np.array(size) + BEYOND_PX).any(axis=(1, 2))
@@ -47,7 +47,7 @@ def beyond(pixels: Floats, size: tuple[int, int]) -> str:
 
 
 def of_resolution(recording: Recording) -> Iterator[Fault]:
-    """At most one."""
+    """Yields a fault of resolution, or none."""
     header, pixels = recording.header, recording.tracks.pixels
     words = beyond(pixels, (header.image_width_px, header.image_height_px))
     if not words:

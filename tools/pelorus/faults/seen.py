@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How fast the camera goes and turns, as the images alone have it, in the axes of the body."""
+"""The camera's velocity and rate of turn by the images alone, in the axes of the body."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from pelorus.recording import Recording
 from pelorus.tracks import Tracks
 
 POINTS_MIN = 6  # of a pair of frames
-LONGER = 0.02  # by which a focal length is changed to see what that does
+LONGER = 0.02  # change of the focal length for its derivative
 
 
-GAP_PERIODS = 5.0  # of a stream: where it pauses for longer nothing is known of the motion
+GAP_PERIODS = 5.0  # a longer pause of a stream leaves the motion unknown
 BLOCKS = 20
-SHAKES_D2, SHAKES_SHARE = 600.0, 0.02  # of six degrees of freedom, ten sigma; of the frames
-BESIDE = (2, 3)  # frames: the next ones share a picture
+SHAKES_D2, SHAKES_SHARE = 600.0, 0.02  # of six degrees of freedom, ten sigma; share of the frames
+BESIDE = (2, 3)  # frames: adjacent pairs share a picture
 
 
 @dataclass(frozen=True)
-class Seen:
-    """The camera's own v and w in body axes as given, (k, 6), their variances, and which count."""
+class CameraMotion:
+    """The camera's v and w in body axes, (k, 6), their variances, and which are usable."""
 
     rates: Floats
     variance: Floats
     usable: NDArray[np.bool_]
     tau_s: Floats
-    by_focal: Floats | None = None  # (k, 6) by the logarithm of the focal length that is given
-    halves: tuple[Seen, Seen] | None = None  # by every other point: noises of their own
+    by_focal: Floats | None = None  # (k, 6) derivative by the logarithm of the focal length
+    halves: tuple[CameraMotion, CameraMotion] | None = (
+        None  # by every other point, with independent noise
+    )
 
     @property
     def moves(self) -> float:
-        """By how many standard errors the camera moves: what it does lasts, and its noise does not
-        reach the frames beside.
-        """
+        """Returns by how many standard errors the camera moves: motion lasts, noise does not."""
         beside = self.beside()
         good = self.usable & np.isfinite(beside).all(axis=1)
         own, told, trust = self.rates[good], beside[good], 1 / self.variance[good]
@@ -50,14 +50,12 @@ class Seen:
 
     @property
     def shakes(self) -> bool:
-        """Whether some frames move by far more than their noise, be it to and fro from one to the
-        next.
-        """
+        """Returns whether some frames move by far more than their noise, even to and fro."""
         d2 = np.sum(self.rates[self.usable] ** 2 / self.variance[self.usable], axis=1)
         return bool(len(d2)) and float(np.mean(d2 > SHAKES_D2)) > SHAKES_SHARE
 
     @classmethod
-    def of(cls, recording: Recording, views: TwoViews) -> Seen:
+    def of(cls, recording: Recording, views: TwoViews) -> CameraMotion:
         lag, R = views.lag, recording.T_CB.R
         tau = np.asarray(recording.frame_t_ns[lag:] - recording.frame_t_ns[:-lag]) * 1e-9
         rates = se3.log(se3.inverse(views.motion)) / tau[:, None]
@@ -70,8 +68,8 @@ class Seen:
         usable &= tau <= GAP_PERIODS * np.median(tau)
         return cls(in_body, variance, usable, tau)
 
-    def without(self, wrong: NDArray[np.bool_]) -> Seen:
-        """Without these frames."""
+    def without(self, wrong: NDArray[np.bool_]) -> CameraMotion:
+        """Returns the motion without these frames."""
         halves = None
         if self.halves is not None:
             one, two = (replace(half, usable=half.usable & ~wrong) for half in self.halves)
@@ -79,9 +77,11 @@ class Seen:
         return replace(self, usable=self.usable & ~wrong, halves=halves)
 
     def beside(self) -> Floats:
-        """(k, 6) v and w as the frames beside tell them, each as far as it knows; NaN where none
-        does. They have no picture in common with the pair itself, so that neither its noise is in
-        them nor any of the body's sensors.
+        """Returns (k, 6) v and w as predicted by neighbouring frames, weighted; NaN where there are
+        none.
+
+        They share no picture with the pair itself, so its noise and that of the body's sensors are
+        not in them.
         """
         trust = np.where(self.usable[:, None], 1 / (self.variance + 1e-12), 0.0)
         told = np.where(self.usable[:, None], self.rates, 0.0) * trust
@@ -90,39 +90,40 @@ class Seen:
             return np.asarray(total / np.where(weight > 0, weight, np.nan))
 
     def slope(self) -> Floats:
-        """(k, 6) how fast they change, as the frames beside tell it; NaN where these do not."""
+        """Returns (k, 6) the slope of v and w by neighbouring frames; NaN where there are none."""
         usable = np.where(self.usable[:, None], self.rates, np.nan)
         return slope(usable, BESIDE[0], float(np.median(self.tau_s)))
 
     def itself(self) -> Motions:
-        """Of one half of the points, for the other one: at the same time, and with other noise."""
+        """Returns this half's motion as an instrument of the other: independent noise."""
         usable = np.where(self.usable[:, None], self.rates, np.nan)
         return Motions(usable, slope(usable, 1, float(np.median(self.tau_s))), self.by_focal)
 
     def of_others(self) -> Motions:
-        """Of all points, by the frames beside."""
+        """Returns the motion by all points of neighbouring frames, as an instrument."""
         focal = None if self.by_focal is None else beside(self.by_focal, *BESIDE)
         return Motions(self.beside(), self.slope(), focal)
 
-    def pairs(self) -> list[tuple[Seen, list[Motions]]]:
-        """What is to be explained, and what tells the same motion with other noise."""
+    def pairs(self) -> list[tuple[CameraMotion, list[Motions]]]:
+        """Returns motions to explain, with instruments: the same motion with other noise."""
         beside = self.of_others()
         if self.halves is None:
             return [(self, [beside])]
         one, other = self.halves
         return [(one, [other.itself(), beside]), (other, [one.itself(), beside])]
 
-    def with_halves(self, recording: Recording, lag: int, frames_least: int) -> Seen:
-        """And what each half of the points tells, where it tells enough, also with another focal
-        length. Neither turns nor ways simply scale with it: of near points the one is mistaken for
-        the other.
+    def with_halves(self, recording: Recording, lag: int, frames_least: int) -> CameraMotion:
+        """Returns this with the motion of each half of the points, where these suffice.
+
+        Each is also computed with another focal length. Neither turns nor displacements simply
+        scale with it: with near points one is mistaken for the other.
         """
         camera = recording.header.camera
         longer = replace(
             camera, fx_px=(1 + LONGER) * camera.fx_px, fy_px=(1 + LONGER) * camera.fy_px
         )
         parts = by_turns(recording.tracks)
-        own, other = ([Seen.of(recording, two_views(part, c, lag)) for part in parts]
+        own, other = ([CameraMotion.of(recording, two_views(part, c, lag)) for part in parts]
                       for c in (camera, longer))  # fmt: skip
         if min(int(half.usable.sum()) for half in own) < frames_least:
             return self
@@ -132,9 +133,7 @@ class Seen:
 
 
 class Motions(NamedTuple):
-    """What of a motion is told otherwise: rates and slopes (k, 6), and how a focal length changes
-    them.
-    """
+    """Instruments of a motion: rates and slopes (k, 6), and how a focal length changes them."""
 
     rates: Floats
     slope: Floats
@@ -142,7 +141,7 @@ class Motions(NamedTuple):
 
 
 def by_turns(tracks: Tracks) -> list[Tracks]:
-    """Every other point, each point as a whole."""
+    """Returns two halves of the points, each point whole."""
     _, number = np.unique(tracks.id, return_inverse=True)
     return [
         Tracks(tracks.frame_count, tracks.frame[k], tracks.id[k], tracks.pixels[k])
@@ -151,17 +150,17 @@ def by_turns(tracks: Tracks) -> list[Tracks]:
 
 
 def beside(x: Floats, *lags: int) -> Floats:
-    """The mean of the values so many frames before and behind; NaN at the ends."""
+    """Returns the mean of the values so many frames before and after; NaN at the ends."""
     return np.asarray(sum(_moved(x, k) + _moved(x, -k) for k in lags) / (2 * len(lags)))
 
 
 def slope(x: Floats, lag: int, tau_s: float) -> Floats:
-    """By the time, from the values so many frames before and behind."""
+    """Returns the slope by time, from the values so many frames before and after."""
     return np.asarray((_moved(x, lag) - _moved(x, -lag)) / (2 * lag * tau_s))
 
 
 def _moved(x: Floats, by: int) -> Floats:
-    """x of k + by."""
+    """Returns x shifted: at k the value of k + by, NaN at the ends."""
     out = np.full_like(x, np.nan)
     if by > 0:
         out[:-by] = x[by:]
@@ -179,7 +178,7 @@ def _of_neighbours(x: Floats) -> Floats:
 
 
 def pauses(t: Times | Floats, begin: Times | Floats, end: Times | Floats) -> NDArray[np.bool_]:
-    """Whether a stream pauses from each beginning to its end."""
+    """Returns whether a stream pauses between each beginning and end."""
     steps = np.diff(t)
     longer = steps > GAP_PERIODS * np.median(steps) if len(steps) else np.zeros(0, bool)
     before = np.concatenate(([0], np.cumsum(longer)))
@@ -189,6 +188,6 @@ def pauses(t: Times | Floats, begin: Times | Floats, end: Times | Floats) -> NDA
 
 
 def standard_error(noise: Floats) -> float:
-    """Of the sum over a drive of what chance makes of each frame: by blocks, in which it lasts."""
+    """Returns the standard error of a sum over a drive, by blocks of correlated noise."""
     blocks = np.arange(len(noise)) * BLOCKS // max(len(noise), 1)
     return float(np.linalg.norm(np.bincount(blocks, noise, BLOCKS))) + 1e-12

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Stale tracks: a tracker that re-detects keeps all live ids at their previous pixels for one
-frame, then follows whatever lies there. From that frame on each id is another point of the world.
+"""Detects stale tracks.
 
-Shown by: in some frames every live track repeats its four numbers bit for bit although the body
-moves so far that the image must have moved too. A camera at rest, or a track that happens to
-repeat alone, is no such frame. Remedy: a new id from there on.
+A tracker that re-detects may keep all live ids at their previous pixels for one frame, and then
+follow whatever is there: from that frame on each id is another point of the world. In such a frame
+every live track repeats its four numbers bit for bit although the image must have moved. A camera
+at rest, or a single track that happens to repeat, is none. Remedy: a new id from there on.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from pelorus.tracks import Pairs, Tracks, project
 from pelorus.visual_motion import seen_pairs
 
 SUBJECT = "stale tracks"
-MOVED_MIN_PX = 0.1  # median image motion that the twists must predict for a repeat to be false
+MOVED_MIN_PX = 0.1  # median image motion that the twists must predict
 LIVE_MIN = 3  # tracks that must repeat together
 
 
 def mend(recording: Recording) -> tuple[Recording, Finding]:
-    """Give the tracks of stale frames new ids."""
+    """Gives the tracks of stale frames new ids."""
     pairs = recording.tracks.pairs(1)
     repeats = _repeats(recording.tracks, pairs)
     frames = _stale_frames(recording, pairs, repeats)
@@ -53,7 +53,7 @@ def _repeats(tracks: Tracks, pairs: Pairs) -> NDArray[np.bool_]:
 def _stale_frames(
     recording: Recording, pairs: Pairs, repeats: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """(T,): frames in which all live tracks repeat while the body moves."""
+    """Returns (T,) frames in which all live tracks repeat while the body moves."""
     count = recording.tracks.frame_count
     frame = recording.tracks.frame[pairs.second]
     live = np.bincount(frame, minlength=count)
@@ -63,9 +63,10 @@ def _stale_frames(
 
 
 def _predicted_px(recording: Recording) -> NDArray[np.float64]:
-    """(T,): how far the twists say the image moved since the previous frame, median, px.
+    """Returns (T,) the median image motion since the previous frame by the twists, px.
 
-    Where a point is seen and where the motion brings it: no noise of the pixels enters.
+    It compares where a point is seen with where the motion brings it, so pixel noise does not
+    enter.
     """
     camera = recording.header.camera
     seen = seen_pairs(recording.tracks, camera, 1)
@@ -75,7 +76,7 @@ def _predicted_px(recording: Recording) -> NDArray[np.float64]:
 
 
 def _split(tracks: Tracks, stale: NDArray[np.intp]) -> Tracks:
-    """A new id for each stale row, kept by the later rows of that track up to the next one."""
+    """Gives each stale row a new id, which later rows of that track keep."""
     order = np.lexsort((tracks.frame, tracks.id))
     begins = np.zeros(len(tracks), bool)
     begins[stale] = True

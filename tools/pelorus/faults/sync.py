@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Were the left and the right picture taken together?
+"""Detects left and right pictures that were not taken together.
 
 The rows of a point are equal in a rectified pair. If the right picture is taken dt later, its row
 is off by dt times the rate at which the point moves through the rows. So the rows' difference is
-held against that rate, which the same tracks tell from the frames beside. What a calibration is
-off by depends on the place in the picture alone, and is fitted beside it.
+regressed on that rate, which the same tracks give in neighbouring frames. Errors of the calibration
+depend on the place in the picture alone, and are fitted with it.
 """
 
 from __future__ import annotations
@@ -27,10 +27,8 @@ MAD_TO_SIGMA, WITHIN_SIGMAS, ROUNDS = 1.4826, 4.0, 5
 
 
 @dataclass(frozen=True)
-class Apart:
-    """The right picture is so much later than the left one, s; points move by so much
-    meanwhile, px, RMS.
-    """
+class PictureDelay:
+    """Delay of the right picture, s, and the motion of points meanwhile, px, RMS."""
 
     by_s: float
     sigma_s: float
@@ -38,7 +36,7 @@ class Apart:
 
     @property
     def found(self) -> bool:
-        """Whether it is there, and does harm."""
+        """Returns whether the delay is significant and does harm."""
         sure = abs(self.by_s) > max(SIGMAS * self.sigma_s, APART_S)
         return sure and self.moved_px > HARM_PX
 
@@ -61,11 +59,11 @@ class Apart:
         )
 
 
-def apart(tracks: Tracks, t_ns: Times, camera: Camera) -> Apart | None:
-    """None with too little to tell by.
+def apart(tracks: Tracks, t_ns: Times, camera: Camera) -> PictureDelay | None:
+    """Measures the delay; None with too few data.
 
-    The rate is that between the next frames, and has noise; the one between those beside them has
-    another noise, and is its instrument.
+    The rate is that between adjacent frames, and has noise; the rate between frames farther away
+    has independent noise, and is its instrument.
     """
     near, far = (_beside(tracks, t_ns, lag) for lag in (1, 2))
     both = np.isfinite(near.rows) & np.isfinite(far.rows)
@@ -76,7 +74,8 @@ def apart(tracks: Tracks, t_ns: Times, camera: Camera) -> Apart | None:
     difference = tracks.pixels[at, 3] - tracks.pixels[at, 1]
     rate, weight, by_s = near.rows[at], np.ones(len(at)), 0.0
     for _ in range(ROUNDS):
-        # of the instrument and of both sides, what no place in the picture tells
+        # of the instrument and of both sides, the part that does not depend on the place in the
+        # picture
         told, d, x = (_beyond_place(c, place, weight) for c in (far.rows[at], difference, rate))
         power = float(np.sum(weight * told * x)) + 1e-12
         by_s = float(np.sum(weight * told * d)) / power
@@ -88,18 +87,19 @@ def apart(tracks: Tracks, t_ns: Times, camera: Camera) -> Apart | None:
     noise = weight * told * left
     by_frame = np.bincount(tracks.frame[at], noise, tracks.frame_count).astype(np.float64)
     speed = float(np.sqrt(np.average(near.rows[at] ** 2 + near.columns[at] ** 2, weights=weight)))
-    return Apart(by_s, standard_error(by_frame) / power, abs(by_s) * speed)
+    return PictureDelay(by_s, standard_error(by_frame) / power, abs(by_s) * speed)
 
 
 def _beyond_place(x: Floats, place: Floats, weight: Floats) -> Floats:
-    """What a function of the place in the picture leaves of it."""
+    """Returns x minus its fit as a function of the place in the picture."""
     fit = np.linalg.lstsq(place * weight[:, None], x * weight, rcond=None)[0]
     return np.asarray(x - place @ fit)
 
 
 class Rates(NamedTuple):
-    """How fast the point of each row moves through the rows and columns of the two pictures, px/s;
-    NaN where it is not seen before and behind.
+    """Rates at which each row's point moves through rows and columns of the two pictures, px/s.
+
+    NaN where it is not seen before and after.
     """
 
     rows: Floats
@@ -107,7 +107,7 @@ class Rates(NamedTuple):
 
 
 def _beside(tracks: Tracks, frame_t_ns: Times, lag: int) -> Rates:
-    """By the views so many frames before and behind."""
+    """Returns the rates by the views so many frames before and after."""
     pairs = tracks.pairs(lag)
     behind, before = np.full(len(tracks), -1), np.full(len(tracks), -1)
     behind[pairs.first], before[pairs.second] = pairs.second, pairs.first
@@ -125,7 +125,7 @@ def _beside(tracks: Tracks, frame_t_ns: Times, lag: int) -> Rates:
 
 
 def _of_place(pixels: Floats, camera: Camera) -> Floats:
-    """1, x, y, x^2, x y, y^2 of the left pixel, and the disparity: what a calibration is off by."""
+    """Returns 1, x, y, x^2, x y, y^2 of the left pixel, and the disparity."""
     x = (pixels[:, 0] - camera.cx_px) / camera.fx_px
     y = (pixels[:, 1] - camera.cy_px) / camera.fx_px
     disparity = (pixels[:, 0] - pixels[:, 2]) / camera.fx_px

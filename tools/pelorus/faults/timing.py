@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Twist timing: does the reading of frame k hold behind it or before it?
+"""Detects the twists' timing: does the reading of frame k hold after it or before it?
 
-Shown by: points of frame k carried to frame k + 1 with either reading. `mid` does not compete: a
-mean of two noisy readings has less noise and would win for that alone.
+Points of frame k are carried to frame k + 1 with either reading. `mid` does not compete: a mean of
+two noisy readings has less noise and would win for that alone.
 """
 
 from __future__ import annotations
 
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
-from pelorus.faults.likelihood import told
+from pelorus.faults.likelihood import with_ratio
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
 from pelorus.visual_motion import seen_pairs
@@ -18,7 +18,7 @@ Z_MIN = 3.0
 
 
 def choose(recording: Recording) -> tuple[Recording, Finding]:
-    """START unless END explains clearly more frames."""
+    """Returns the recording with START, unless END explains clearly more frames."""
     camera = recording.header.camera
     seen = seen_pairs(recording.tracks, camera, 1)
     choices = [
@@ -37,8 +37,8 @@ def choose(recording: Recording) -> tuple[Recording, Finding]:
             f"{result.challenger:.2f} px with end, "
             f"smaller in {100 * result.share:.0f} % of {result.frames} frames"
         )
-        evidence = told(evidence, result.ratio if late else None)
+        evidence = with_ratio(evidence, result.ratio if late else None)
     action = f"twist timing is {'end' if late else 'start'}"
     return choices[int(late)], Finding(
-        "twist timing", bool(late), evidence, action, told=result.frames > 0
+        "twist timing", bool(late), evidence, action, is_conclusive=result.frames > 0
     )

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What the twists say of the body's motion, and what may be wrong with it:
+"""The body's motion by the twists, and its derivatives by what may be wrong with it.
 
 w = a w_B - b_w + phi_w x w_B + (dt + dt_w) w_B'
 v = s g - b_v + phi_v x g + w_B x dr + dt g',      g = v_B + w_B x r
 
-dt_w, by which the rates of turn are later than the velocities, is 0 unless it is asked for.
+dt_w, the delay of the rates of turn behind the velocities, is 0 unless it is asked for.
 """
 
 from __future__ import annotations
@@ -26,22 +26,23 @@ from pelorus.faults.fit import (
     TURN_SCALE,
     Design,
 )
-from pelorus.faults.seen import Seen, beside, pauses, slope
+from pelorus.faults.seen import CameraMotion, beside, pauses, slope
 from pelorus.layout import Floats
 from pelorus.motion import dead_reckoning
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 
-ONE_CLOCK_S, OWN_CLOCK_S = 1e-6, 0.3  # sigmas of by how much the rates of turn are later
-SPREAD_MOST = 3.0  # of what images and twists differ by, in its own spread
-FAR, NEAR = 3, 2  # frames from which a slope is taken: farther than a reading's noise reaches
+ONE_CLOCK_S, OWN_CLOCK_S = 1e-6, 0.3  # prior sigmas of the rates' delay behind the velocities
+SPREAD_MOST = 3.0  # factor on the usual difference of images and twists
+FAR, NEAR = 3, 2  # frames from which a slope is taken, beyond the reach of a reading's noise
 
 
 class TwistBody:
-    """What the twists say of the motion between any two times. `turns_late_s`: the rates of turn
-    are taken so much later than the velocities, and how far they are from that is asked, too.
-    `for_place`: the lever is free of the gyro's noise, too, and known worse; other unknowns are
-    surer with one that is a little short.
+    """The motion between any two times by the twists.
+
+    `turns_late_s`: the rates of turn are taken so much later than the velocities, and this delay is
+    estimated, too. `for_place`: the lever's column is free of the gyro's noise, and less precise;
+    the other unknowns are more precise with one that is slightly biased.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class TwistBody:
         self._held = header.twist_timing.name
 
     def at(self, t_s: Floats) -> Poses:
-        """Poses at seconds since the first twist; between two nodes at an even rate."""
+        """Returns poses at seconds since the first twist; the rate is constant between nodes."""
         nodes = (self._t_ns - self._t_ns[0]) * 1e-9
         k = np.clip(np.searchsorted(nodes, t_s, side="right") - 1, 0, len(nodes) - 2)
         share = (t_s - nodes[k]) / (nodes[k + 1] - nodes[k])
@@ -67,8 +68,9 @@ class TwistBody:
         return se3.compose(self._nodes.at(k), se3.exp(part[:, :3], part[:, 3:]))
 
     def rates(self, frame_t_ns: NDArray[np.int64], lag: int, offset_s: float) -> Floats:
-        """(k, 6) v and w on average between frames k and k + lag, if these were later by so much.
-        NaN where the twists do not reach.
+        """Returns (k, 6) mean v and w between frames k and k + lag that are `offset_s` later.
+
+        NaN where there are no twists.
         """
         out = self._rates(frame_t_ns, lag, offset_s)
         if self._turns_late_s:
@@ -76,7 +78,7 @@ class TwistBody:
         return out
 
     def _rates(self, frame_t_ns: NDArray[np.int64], lag: int, offset_s: float) -> Floats:
-        """Of one clock."""
+        """Returns the same for one clock of velocities and rates."""
         t = (frame_t_ns - self._t_ns[0]) * 1e-9 + offset_s
         path = self.at(t)
         tau = t[lag:] - t[:-lag]
@@ -89,12 +91,15 @@ class TwistBody:
         return out
 
     def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
-        """As fit.Body."""
+        """Returns the mean rates between frames, as fit.Body."""
         return self.rates(frame_t_ns, 1, offset_s)[:, 3:]
 
-    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
-        """As fit.Body. Scale and time are free of the twists' noise by instruments: the same motion
-        some frames away.
+    def design(
+        self, recording: Recording, seen: CameraMotion, offset_s: float, bias: float
+    ) -> Design:
+        """Returns the design of the usable pairs, as fit.Body.
+
+        Instruments keep scale and time free of the twists' noise: the same motion some frames away.
         """
         rates = self.rates(recording.frame_t_ns, 1, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
@@ -112,7 +117,7 @@ class TwistBody:
 
 
 def _prior(bias: float, turns_late: float) -> Floats:
-    """Inverse variances: all but the velocity's bias are hardly known."""
+    """Returns inverse variances: nothing but the velocity's bias is known beforehand."""
     sigma = np.full(PARAMETERS, 10.0)
     sigma[BIAS : BIAS + 3] = bias
     sigma[LEVER : LEVER + 3] = 3.0
@@ -122,8 +127,8 @@ def _prior(bias: float, turns_late: float) -> Floats:
     return np.diag(sigma**-2)
 
 
-def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
-    """(k, 6, m): what each unknown adds to (v, w), and the instruments."""
+def _columns(g: Floats, w: Floats, seen: CameraMotion) -> tuple[Floats, Floats]:
+    """Returns (k, 6, m) what each unknown adds to (v, w), and the instruments."""
     X = np.zeros((len(g), 6, PARAMETERS))
     X[:, :3, SCALE] = g
     X[:, :3, BIAS : BIAS + 3] = X[:, 3:, GYRO : GYRO + 3] = -np.eye(3)
@@ -141,11 +146,13 @@ def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
     return X, Z
 
 
-def _slope_beside(told: Floats, seen: Seen) -> Floats:
-    """By the time, from what images and twists tell together of the frames beside, each as far as
-    it is the surer one. Between two readings the twists are a mean of both, and share their noise
-    with the next but one: of them the slope is taken from farther off. An instrument that
-    shares it makes any offset by half a reading look like the right one.
+def _slope_beside(told: Floats, seen: CameraMotion) -> Floats:
+    """Returns the slope by time, by images and twists of neighbouring frames, weighted by
+    precision.
+
+    Between two readings the twists are a mean of both, and share their noise with the next but one:
+    their slope is taken from farther away. An instrument that shares it would make any offset by
+    half a reading look right.
     """
     tau_s = float(np.median(seen.tau_s))
     off = np.where(seen.usable[:, None], seen.rates - told, 0.0)
@@ -153,7 +160,7 @@ def _slope_beside(told: Floats, seen: Seen) -> Floats:
     off -= np.median(off, axis=0)
     spread = 2.198 * np.median(off[seen.usable] ** 2, axis=0) + 1e-12
     of_images = np.median(seen.variance[seen.usable], axis=0)
-    share = np.clip(1 - of_images / spread, 0, 1)  # of the noise, what the twists have
+    share = np.clip(1 - of_images / spread, 0, 1)  # share of the noise that the twists have
     most = SPREAD_MOST * np.sqrt(spread)
     by_images = slope(told + np.clip(off, -most, most), NEAR, tau_s)
     return np.asarray(share * by_images + (1 - share) * slope(told, FAR, tau_s))

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The camera's motion between two frames, and how well it is known, from their common tracks.
+"""Estimates the camera's motion between two frames, with its covariance, from common tracks.
 
 Both views of a point are measured with the same noise, and the point itself is unknown: motion and
-points are those that make all four pictures likeliest. A point is its left pixel and its disparity,
-so that far points, whose disparity noise may take below zero, need not be left out; and every step
-linearises where both views together have the point. To take points from the first view alone, as
-pelorus.visual_motion does, makes every way about 1 % too short: that is what is measured here.
+points maximise the likelihood of all four pictures. A point is its left pixel and its disparity, so
+that far points, whose disparity noise may take below zero, need not be left out; and every step
+linearises at the point by both views together. Taking points from the first view alone, as
+pelorus.visual_motion does, shortens every displacement by about 1 %, which is the size of what is
+measured here.
 """
 
 from __future__ import annotations
@@ -35,9 +36,11 @@ FAR_OFF = 50.0  # d^2 beyond which a point stays where the first view has it
 
 @dataclass(frozen=True)
 class TwoViews:
-    """For each k the motion that brings coordinates in camera k to camera k + lag, with the
-    covariance of a small step on its left; and for each pair of observations its d^2 in that
-    motion, of three degrees of freedom and in units of sigma_px.
+    """The motion between frames k and k + lag.
+
+    `motion` maps coordinates in camera k to camera k + lag, with the covariance of a small step on
+    its left. `d2` is for each pair of observations, of three degrees of freedom, in units of
+    sigma_px.
     """
 
     lag: int
@@ -52,7 +55,7 @@ class TwoViews:
 
 
 def two_views(tracks: Tracks, camera: Camera, lag: int) -> TwoViews:
-    """Gauss-Newton with robust weights, all frames at once."""
+    """Estimates all motions at once, by Gauss-Newton with robust weights."""
     pairs = tracks.pairs(lag)
     rows = np.abs(tracks.pixels[:, 1] - tracks.pixels[:, 3]) < ROW_GAP_MAX_PX
     good = rows[pairs.first] & rows[pairs.second]
@@ -89,7 +92,7 @@ class _Solver:
         self.d2 = np.zeros(len(frame))
 
     def step(self, accepts: float) -> None:
-        """All motions by one step, then the points."""
+        """Moves all motions by one step, then the points."""
         frame = self._frame
         R, p = np.moveaxis(self.R, 0, -1)[..., frame], self.p.T[:, frame]
         h, Jx, J = linearised(self._camera, self._x, R, p)
@@ -113,5 +116,5 @@ class _Solver:
             self.sigma = max(float(np.sqrt(np.median(d2) / CHI2_3_MEDIAN)), SIGMA_LEAST_PX)
 
     def _sums(self, values: Floats) -> Floats:
-        """Of (..., n) by frame, (count, ...)."""
+        """Returns the sums (count, ...) by frame of values (..., n)."""
         return sum_by_frame(self._frame, self._count, np.moveaxis(values, -1, 0))

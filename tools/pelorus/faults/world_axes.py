@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Velocities in axes that do not turn with the body, as some drivers write an odometry's twist.
+"""Detects velocities in axes that do not turn with the body, as some odometry drivers write them.
 
-Such a velocity is R_k v_k with the body's attitude R_k. The pictures show v_k, the rates of turn
-give R_k but for a rotation R_0 at the start: the one that fits best is held against the axes as
-given, turned as suits them best. On a straight way both are the same, and nothing is told.
+Such a velocity is R_k v_k with the body's attitude R_k. The pictures show v_k, and the rates of
+turn give R_k up to a rotation R_0 at the start. The best R_0 competes with the given axes, turned
+as fits best. On a straight way both are the same, and nothing is shown.
 """
 
 from __future__ import annotations
@@ -13,26 +13,24 @@ import numpy as np
 from pelorus import se3
 from pelorus.faults.fit import BLOCKS_LEAST
 from pelorus.faults.handeye import mean_twists
-from pelorus.faults.seen import BLOCKS, Seen, standard_error
+from pelorus.faults.seen import BLOCKS, CameraMotion, standard_error
 from pelorus.faults.twist_body import TwistBody
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 ROUNDS = 8
-MOVES_SHARE = 0.1  # of the usual speed by the pictures
+MOVES_SHARE = 0.1  # share of the usual speed by the pictures
 
 
-def world_axes(recording: Recording, seen: Seen) -> float:
-    """2 ln of the ratio of likelihoods; negative where the axes as given are the likelier ones, 0
-    where there is too little to tell by.
-    """
+def world_axes(recording: Recording, seen: CameraMotion) -> float:
+    """Returns 2 ln of the likelihood ratio of world axes to body axes; 0 with too few data."""
     t_s = (recording.frame_t_ns - recording.twist_t_ns[0]) * 1e-9
     R = TwistBody(recording).at(0.5 * (t_s[1:] + t_s[:-1])).R
     told = mean_twists(recording)[:, :3]
     arm = -recording.T_CB.R.T @ recording.T_CB.p
     own = seen.rates[:, :3] - np.cross(seen.rates[:, 3:], arm)
     good = seen.usable & np.isfinite(told).all(axis=1)
-    # wheels that stand, of a robot that is carried or lifted, have no direction
+    # wheels of a robot that is carried or lifted stand, and have no direction
     usual = float(np.median(np.linalg.norm(own[good], axis=1))) if good.any() else 0.0
     good &= np.linalg.norm(np.nan_to_num(told), axis=1) > MOVES_SHARE * usual
     if good.sum() < BLOCKS_LEAST * BLOCKS:
@@ -54,7 +52,7 @@ def world_axes(recording: Recording, seen: Seen) -> float:
 
 
 def _turn(a: Floats, b: Floats) -> Floats:
-    """The rotation that brings a to b, robustly."""
+    """Returns the rotation that maps a to b, robustly."""
     R, weight = np.eye(3), np.ones(len(a))
     for _ in range(ROUNDS):
         R = se3.nearest_rotation((b * weight[:, None]).T @ a)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A robot's log against the desk: what it computed then, and what a replay computes now."""
+"""Compares a robot's log with the desk: what it computed, and what a replay computes."""

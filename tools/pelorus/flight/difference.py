@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""In what two answers to one frame differ, and by how much."""
+"""The differences between two answers to one frame."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ DIAGONAL = [i * (i + 3) // 2 for i in range(6)]
 
 
 @dataclass(frozen=True)
-class Sizes:
-    """How far two poses lie apart."""
+class PoseDistance:
+    """Distances between two poses."""
 
     position_m: float = 0.0
     angle_deg: float = 0.0
@@ -38,14 +38,14 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Difference:
-    """Of one frame's answers. Where nothing is listed, all that both hold has the same bits."""
+    """Differences between one frame's answers; if none is listed, all common bits are equal."""
 
     robot: Frame
     desk: Frame
-    pose: list[str] = field(default_factory=list)  # what of POSE has other bits
+    pose: list[str] = field(default_factory=list)  # fields of POSE with other bits
     report: dict[str, tuple[float, float]] = field(default_factory=dict)  # name: desk, robot
-    missing: str = ""  # what of the answer the log does not hold
-    sizes: Sizes = Sizes()
+    missing: str = ""  # what the log lacks of the answer
+    sizes: PoseDistance = PoseDistance()
 
     @property
     def same(self) -> bool:
@@ -53,7 +53,7 @@ class Difference:
 
 
 def differ(robot: Frame, desk: Frame) -> Difference:
-    """Compare bit by bit what both hold; an answer is a REPORT, with a POSE if it was taken."""
+    """Compares bit by bit what both have; an answer is a REPORT, with a POSE if it was accepted."""
     found = Difference(robot, desk)
     if robot.report is not None and desk.report is not None:
         found = replace(found, report=_reports(robot.report, desk.report))
@@ -86,16 +86,16 @@ def _reports(robot: Report, desk: Report) -> dict[str, tuple[float, float]]:
     return {name: pair for name, pair in pairs.items() if _bits(pair[0]) != _bits(pair[1])}
 
 
-def _poses(robot: Pose, desk: Pose) -> tuple[list[str], Sizes]:
+def _poses(robot: Pose, desk: Pose) -> tuple[list[str], PoseDistance]:
     if robot == desk:
-        return [], Sizes()
+        return [], PoseDistance()
     words = [
         word
         for name, word in POSE_WORDS.items()
         if _bits(getattr(robot, name)) != _bits(getattr(desk, name))
     ]
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        sizes = Sizes(
+        sizes = PoseDistance(
             _finite(float(np.linalg.norm(robot.p_WB_m - desk.p_WB_m))),
             _finite(_angle_deg(desk.R_WB.T @ robot.R_WB)),
             _finite(_covariance(robot.covariance, desk.covariance)),
@@ -108,7 +108,7 @@ def _bits(value: object) -> bytes:
 
 
 def _angle_deg(R: Floats) -> float:
-    """From the skew part: the trace would turn float32's rounding into hundredths of a degree."""
+    """Returns the angle by the skew part: the trace would amplify float32's rounding."""
     s = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return float(np.degrees(np.arctan2(s, np.trace(R) - 1)))
 

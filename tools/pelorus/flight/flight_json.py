@@ -9,12 +9,12 @@ from typing import Any
 
 from pelorus.flight.difference import Difference
 from pelorus.flight.judge import Judgement, of_this_version, verdict_of
-from pelorus.flight.log import NOWHERE, Log
+from pelorus.flight.log import NOWHERE, RobotLog
 from pelorus.frames import Config
 
 
-def of(log: Log, judgements: Sequence[Judgement]) -> dict[str, Any]:
-    """All that `compare` tells; a part is a life of the robot."""
+def of(log: RobotLog, judgements: Sequence[Judgement]) -> dict[str, Any]:
+    """Returns all that `compare` reports; a part is one life of the robot."""
     return {
         "log": str(log.path),
         "verdict": verdict_of(judgements).name.lower(),

@@ -11,7 +11,7 @@ from pathlib import Path
 from pelorus import ARITHMETIC, __version__
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, differ
-from pelorus.flight.log import NOWHERE, Frame, Log, Loss, Part, frames_of
+from pelorus.flight.log import NOWHERE, Frame, Loss, Part, RobotLog, frames_of
 from pelorus.frames import Config, Header
 from pelorus.replay import Programs, replayed
 from pelorus.settings import describe
@@ -20,7 +20,7 @@ FNV_OFFSET, FNV_PRIME = 2166136261, 16777619
 WITH_ALL_ROOMS = 3  # PLR_SUPERVISE and PLR_KNOWN_MAP
 
 
-class Verdict(IntEnum):
+class BitsVerdict(IntEnum):
     """The exit status."""
 
     SAME = 0
@@ -30,18 +30,18 @@ class Verdict(IntEnum):
 
 @dataclass(eq=False)
 class Judgement:
-    """Of one part."""
+    """The verdict on one part."""
 
     part: Part
-    verdict: Verdict = Verdict.SAME
+    verdict: BitsVerdict = BitsVerdict.SAME
     why: str = ""
-    differences: list[Difference] = field(default_factory=list)  # one a frame that was answered
+    differences: list[Difference] = field(default_factory=list)  # one for each answered frame
     desk: Config | None = None
-    left_out: list[Frame] = field(default_factory=list)  # they did not reach the robot, it seems
+    left_out: list[Frame] = field(default_factory=list)  # they probably did not reach the robot
 
     @property
     def same(self) -> int:
-        """Frames whose whole answer has the desk's bits."""
+        """Returns the number of frames whose whole answer has the desk's bits."""
         return sum(d.same and not d.missing for d in self.differences)
 
     @property
@@ -50,7 +50,7 @@ class Judgement:
 
     @property
     def loss(self) -> Loss | None:
-        """What was lost last before or at the first difference."""
+        """Returns the last loss before or at the first difference."""
         first = self.first
         if first is None:
             return None
@@ -60,18 +60,18 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Desk:
-    """With what the log is replayed."""
+    """The programs and files for a replay."""
 
     programs: Programs
     start: str | None = None
-    state: Path | None = None  # that the first part which restored one goes on from
+    state: Path | None = None  # from which the first part that restored one continues
 
     def program(self, config: Config) -> Path:
         return self.programs.float64 if config.real_bytes == 8 else self.programs.float32
 
 
-def judge(log: Log, desk: Desk) -> list[Judgement]:
-    """Every part by itself. PelorusError where not one can be compared."""
+def judge(log: RobotLog, desk: Desk) -> list[Judgement]:
+    """Judges every part by itself; raises PelorusError where not one can be compared."""
     judgements: list[Judgement] = []
     for part in log.parts:
         state = desk.state if not any(j.part.restored for j in judgements) else None
@@ -81,16 +81,16 @@ def judge(log: Log, desk: Desk) -> list[Judgement]:
     return judgements
 
 
-def verdict_of(judgements: Sequence[Judgement]) -> Verdict:
-    """Different if any part is; the same if all are."""
+def verdict_of(judgements: Sequence[Judgement]) -> BitsVerdict:
+    """Returns DIFFERENT if any part is, SAME if all are."""
     found = {judgement.verdict for judgement in judgements}
-    if Verdict.DIFFERENT in found:
-        return Verdict.DIFFERENT
-    return Verdict.NOT_COMPARABLE if Verdict.NOT_COMPARABLE in found else Verdict.SAME
+    if BitsVerdict.DIFFERENT in found:
+        return BitsVerdict.DIFFERENT
+    return BitsVerdict.NOT_COMPARABLE if BitsVerdict.NOT_COMPARABLE in found else BitsVerdict.SAME
 
 
 def fingerprint(version: str, arithmetic: int, build: Config) -> int:
-    """plr_build_fingerprint (src/record/words.c): what a build of that version would say."""
+    """Returns plr_build_fingerprint (src/record/words.c) of a build of that version."""
     major, minor, patch = (int(number) for number in version.split("."))
     capacities = (build.max_landmarks, build.max_observations, build.block_observations)
     value = FNV_OFFSET
@@ -102,7 +102,7 @@ def fingerprint(version: str, arithmetic: int, build: Config) -> int:
 
 
 def of_this_version(build: Config) -> bool:
-    """Whether a build is of the version, and computes as the one, that these tools belong to."""
+    """Returns whether a build has these tools' version and arithmetic."""
     return build.build_fingerprint == fingerprint(__version__, ARITHMETIC, build)
 
 
@@ -112,9 +112,9 @@ def of_this_version(build: Config) -> bool:
 def _judge(part: Part, desk: Desk, state: Path | None) -> Judgement:
     why = _obstacle(part, state)
     if why or part.config is None:
-        return Judgement(part, Verdict.NOT_COMPARABLE, why)
+        return Judgement(part, BitsVerdict.NOT_COMPARABLE, why)
     found = _compared(part, desk, state, [])
-    if found.verdict is Verdict.NOT_COMPARABLE:
+    if found.verdict is BitsVerdict.NOT_COMPARABLE:
         return found
     if found.first is not None and part.unanswered:
         without = _compared(part, desk, state, part.unanswered)
@@ -124,7 +124,7 @@ def _judge(part: Part, desk: Desk, state: Path | None) -> Judgement:
 
 
 def _obstacle(part: Part, state: Path | None) -> str:
-    """Why no replay can be set up."""
+    """Returns why no replay can be set up; empty if one can."""
     if not any(isinstance(m, Header) for m in part.messages):
         return "no HEADER came after the robot's restart: it had no calibration to work with"
     if all(frame.unread for frame in part.answered):
@@ -153,7 +153,7 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
     messages = replayed(desk.program(part.config), part.inputs(left_out), options)
     here = next((m for m in messages if isinstance(m, Config) and m.build_fingerprint), None)
     if here is None:
-        return Judgement(part, Verdict.NOT_COMPARABLE, "the replay's filter did not start")
+        return Judgement(part, BitsVerdict.NOT_COMPARABLE, "the replay's filter did not start")
     found = Judgement(part, desk=here, left_out=left_out)
     ours = frames_of(messages)
     absent = {id(frame) for frame in left_out}
@@ -165,7 +165,7 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
             f"{here.max_observations} observations in one"
         )
     if why:
-        found.verdict, found.why = Verdict.NOT_COMPARABLE, why
+        found.verdict, found.why = BitsVerdict.NOT_COMPARABLE, why
         return found
     pairs = zip(theirs, ours, strict=True)
     found.differences = [differ(robot, mine) for robot, mine in pairs if robot.answered]
@@ -173,7 +173,7 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
 
 
 def _unlike(robot: Config, here: Config) -> str:
-    """What makes the replay another filter than the robot's."""
+    """Returns in what the replay is another filter than the robot's; empty if in nothing."""
     if robot.block_observations != here.block_observations:
         return (
             f"the robot's build takes {robot.block_observations} observations a block and the "
@@ -195,19 +195,19 @@ def _unlike(robot: Config, here: Config) -> str:
 
 
 def _concluded(found: Judgement) -> Judgement:
-    """The verdict on what was compared: behind a loss, other bits are no fault of the robot."""
+    """Returns the verdict; after a loss, other bits are no fault of the robot."""
     first, loss = found.first, found.loss
     if first is not None and loss is not None:
-        found.verdict = Verdict.NOT_COMPARABLE
+        found.verdict = BitsVerdict.NOT_COMPARABLE
         where = "somewhere" if loss.at == NOWHERE else f"from frame {loss.at} on"
         found.why = (
             f"{where} the robot may have had other inputs than the log holds ({loss.words}); "
             "what comes behind cannot be compared"
         )
     elif first is not None:
-        found.verdict = Verdict.DIFFERENT
+        found.verdict = BitsVerdict.DIFFERENT
     elif lacking := _lacking(found):
-        found.verdict = Verdict.NOT_COMPARABLE
+        found.verdict = BitsVerdict.NOT_COMPARABLE
         found.why = f"the log does not hold {lacking}; what it holds has the same bits"
     return found
 

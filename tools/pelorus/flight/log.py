@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A robot's log, taken apart: frames with their answers, and what is known to have been lost.
+"""Reads a robot's log: frames with their answers, and known losses.
 
-A log is read as parts. A board that starts anew forgets everything but what it is then told, so
-each of its lives is a drive of its own, from its HEADER to the next REPORT that says so.
+A log is read as parts. A board that restarts forgets everything but what it is then given, so each
+of its lives is a drive of its own, from its HEADER to the next REPORT of a restart.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from pelorus.schema import STATUSES, number
 from pelorus.settings import IDS, mode_in_force
 from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
 
-# Statuses of what was damaged on the way.
+# Statuses of data that were damaged on the way.
 NOT_ARRIVED = tuple(number("status", name) for name in ("ARGUMENT", "CORRUPT", "FOREIGN"))
 FULL = number("status", "FULL")
 RIGHT = "`pelorus stream --record` and `pelorus-replay --out` write what a replay needs"
@@ -46,7 +46,7 @@ RIGHT = "`pelorus stream --record` and `pelorus-replay --out` write what a repla
 
 @dataclass(eq=False)
 class Frame:
-    """A STEREO and what the filter answered to it."""
+    """A STEREO with the filter's answer to it."""
 
     number: int  # in the log, from 1
     stereo: Stereo
@@ -60,35 +60,35 @@ class Frame:
 
     @property
     def unread(self) -> bool:
-        """It had more observations than the robot has room for, and was refused as a whole."""
+        """Returns whether it had more observations than the robot takes, and was refused."""
         return self.report is not None and not self.report.t_ns and self.report.status == FULL
 
     def within_budget(self) -> Stereo:
-        """As the robot took it: its clock may have allowed fewer observations than the sender."""
+        """Returns it as the robot took it: a time budget may have allowed fewer observations."""
         if self.report is None or self.report.budget >= self.stereo.budget:
             return self.stereo
         return replace(self.stereo, budget=self.report.budget)
 
 
-NOWHERE = 0  # where nothing tells what place a loss has
+NOWHERE = 0  # of a loss at an unknown place
 
 
 class Loss(NamedTuple):
-    """Something that either the robot or the log did not get."""
+    """Data that the robot or the log did not receive."""
 
-    at: int  # number of the first frame that it may have touched, or NOWHERE
+    at: int  # number of the first frame that it may have affected, or NOWHERE
     words: str
 
 
 @dataclass(eq=False)
 class Part:
-    """What one life of a filter took and gave."""
+    """The inputs and answers of one life of a filter."""
 
     messages: list[Message]
     frames: list[Frame]
     losses: list[Loss]
     config: Config | None  # in force
-    restored: bool  # it went on from a state that the log does not hold
+    restored: bool  # it continued from a state that the log lacks
 
     @property
     def answered(self) -> list[Frame]:
@@ -96,18 +96,18 @@ class Part:
 
     @property
     def unanswered(self) -> list[Frame]:
-        """Those with an answered frame behind them."""
+        """Returns the frames without an answer that precede an answered one."""
         last = max((frame.number for frame in self.answered), default=0)
         return [f for f in self.frames if not f.answered and f.number < last]
 
     @property
     def last_words(self) -> list[Frame]:
-        """Those at the end that nothing answered any more."""
+        """Returns the frames at the end without an answer."""
         last = max((frame.number for frame in self.answered), default=0)
         return [f for f in self.frames if not f.answered and f.number > last]
 
     def inputs(self, left_out: Iterable[Frame] = ()) -> list[Message]:
-        """What a replay is given: what the filter took, and its settings before the first data."""
+        """Returns the inputs of a replay: what the filter took, after its settings."""
         absent = {id(f.stereo) for f in (*left_out, *(f for f in self.frames if f.unread))}
         absent |= {id(landmark) for landmark in self._landmarks_without_room()}
         taken = [m for m in self.messages if _is_input(m) and id(m) not in absent]
@@ -117,7 +117,7 @@ class Part:
         return [*taken[:first], *settings, *(limited.get(id(m), m) for m in taken[first:])]
 
     def _landmarks_without_room(self) -> list[Message]:
-        """Refused by a board, whose room for known landmarks is smaller than the desk's."""
+        """Returns known landmarks that a board refused, which has less room than the desk."""
         known = [m for m in self.messages if isinstance(m, Landmark) and _is_input(m)]
         refused = sum(
             isinstance(m, Report) and m.subject == Kind.LANDMARK and m.status == FULL
@@ -127,8 +127,8 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Log:
-    """The parts of a file that hold frames, and remarks on the whole."""
+class RobotLog:
+    """The parts of a file that contain frames, and remarks on the whole."""
 
     path: Path
     parts: list[Part]
@@ -136,8 +136,8 @@ class Log:
     remarks: list[str]
 
 
-def read_log(path: Path) -> Log:
-    """A log of inputs and outputs. PelorusError where it is none, with what would be one."""
+def read_log(path: Path) -> RobotLog:
+    """Reads a log of inputs and outputs; raises PelorusError where it is none."""
     received, counts = read_file(path)
     messages = [frame.message for frame in received]
     kinds = {message.kind for message in messages}
@@ -155,11 +155,11 @@ def read_log(path: Path) -> Log:
         remarks.append("goes on behind END; that was not read")
     if not counts.clean:
         remarks.append(f"the log is damaged: {counts.damaged} frames, {counts.missing} missing")
-    return Log(path, parts, frames, remarks)
+    return RobotLog(path, parts, frames, remarks)
 
 
 def frames_of(messages: Iterable[Message]) -> list[Frame]:
-    """The STEREO frames among messages, with their answers."""
+    """Returns the STEREO frames among messages, with their answers."""
     walk = _Walk(0)
     for message in messages:
         walk.take(message)
@@ -220,7 +220,7 @@ def _part(
 
 
 class _Walk:
-    """Goes through a part and gives each answer to its frame."""
+    """Goes through a part and assigns each answer to its frame."""
 
     def __init__(self, frames_before: int) -> None:
         self.frames: list[Frame] = []
@@ -228,10 +228,10 @@ class _Walk:
         self._before = frames_before
         self._begun = False  # a HEADER has come
         self._waiting: defaultdict[int, deque[Frame]] = defaultdict(deque)  # by time
-        self._offset_ns = 0  # of a POSE from its frame, by the settings in force
+        self._offset_ns = 0  # of a POSE to its frame, by the settings in force
 
     def lose(self, words: str) -> None:
-        """Something is missing here; it may touch the frame that is not answered yet.
+        """Records a loss here, which may affect the frame that is not answered yet.
 
         Before the HEADER a filter takes nothing, so nothing is lost on it.
         """
@@ -273,7 +273,7 @@ class _Walk:
             waiting.popleft().report = report
         elif report.t_ns and not report.status:
             self.lose("an answer to a frame that the log does not hold")
-        elif self.frames and not self.frames[-1].answered:  # refused unread, so at no time
+        elif self.frames and not self.frames[-1].answered:  # refused unread, so without a time
             self.frames[-1].report = report
 
 
@@ -286,7 +286,7 @@ def _is_input(message: Message) -> bool:
 
 
 def _camera_offset_ns(config: Config) -> int:
-    """As the session rounds it; in mapping frames keep their time."""
+    """Returns the offset as the session rounds it; in mapping frames keep their time."""
     offset_s = config.settings.get(IDS["camera-offset"], 0.0)
     if mode_in_force([config]) == "mapping":
         return 0
@@ -294,7 +294,7 @@ def _camera_offset_ns(config: Config) -> int:
 
 
 def _is_restored(messages: Sequence[Message]) -> bool:
-    """Whether the filter said so, or was asked to and did not refuse."""
+    """Returns whether the filter said so, or was asked to and did not refuse."""
     if any(isinstance(m, Report) and m.notice == Notice.RESTORED for m in messages):
         return True
     asked = [m.t_ns for m in messages if isinstance(m, State) and m.action == StateAction.RESTORE]
@@ -303,7 +303,7 @@ def _is_restored(messages: Sequence[Message]) -> bool:
 
 
 def _not_arrived(part: Part, end: End | None) -> int:
-    """How many inputs the log holds that the robot did not get, by its count at the end."""
+    """Returns how many logged inputs did not reach the robot, by its count at the end."""
     if end is None:
         return 0
     held = Counter(m.kind for m in part.messages if _is_input(m))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""`pelorus map`: what a drive says about where the ground is free and where something stands."""
+"""`pelorus map`: where a drive shows that the ground is free, and where it is occupied."""

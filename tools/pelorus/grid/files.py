@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A grid as the pair of files that nav2's map_server reads: an image and a YAML text beside it.
+"""Writes a grid as the two files that nav2's map_server reads: an image and a YAML text.
 
 The image's first row is the map's upper edge, while the origin is the lower left corner. Without
 `negate` a pixel of brightness b says that the cell is occupied with probability (255 - b) / 255; in
@@ -24,12 +24,12 @@ IMAGE, TEXT, PICTURE = "map.pgm", "map.yaml", "map.png"
 
 
 def brightness(grid: Grid) -> NDArray[np.uint8]:
-    """(height, width), row 0 the lowest."""
+    """Returns the brightness (height, width), row 0 the lowest."""
     return np.round(WHITE * (1 - grid.probability)).astype(np.uint8)
 
 
 def cells(grid: Grid) -> NDArray[np.int8]:
-    """What a reader makes of the files: OCCUPIED, FREE or UNKNOWN; row 0 the lowest."""
+    """Returns the cells by a reader of the files: OCCUPIED, FREE or UNKNOWN; row 0 the lowest."""
     occupied = (WHITE - brightness(grid).astype(float)) / WHITE
     out = np.full(occupied.shape, UNKNOWN, np.int8)
     out[occupied > OCCUPIED_THRESH] = OCCUPIED
@@ -38,14 +38,14 @@ def cells(grid: Grid) -> NDArray[np.int8]:
 
 
 def image(grid: Grid) -> bytes:
-    """A binary PGM (netpbm's P5)."""
+    """Returns a binary PGM (netpbm's P5)."""
     pixels = brightness(grid)[::-1]
     height, width = pixels.shape
     return f"P5\n{width} {height}\n{WHITE}\n".encode("ascii") + pixels.tobytes()
 
 
 def text(grid: Grid) -> str:
-    """The YAML beside it."""
+    """Returns the YAML text."""
     x, y = grid.origin_m
     right, up = (axis.name for axis in grid.plane[:2])
     return (
@@ -61,18 +61,19 @@ def text(grid: Grid) -> str:
 
 
 def heights(band: Band) -> str:
-    """The band in words."""
+    """Returns the band in words."""
     if np.isinf(band.low_m) and np.isinf(band.high_m):
         return "all heights"
     return f"heights from {band.low_m:g} to {band.high_m:g} m about the body"
 
 
 def write(folder: Path, grid: Grid, draw: Callable[[Path], None] | None) -> None:
-    """All files, or none: `draw` makes the PNG at a path; None: there is none."""
+    """Writes all files, or none. `draw` makes the PNG at a path; with None there is no PNG."""
     makers: dict[str, Callable[[Path], object]] = {
         IMAGE: lambda path: path.write_bytes(image(grid)),
         **({PICTURE: draw} if draw else {}),
-        TEXT: lambda path: path.write_text(text(grid), encoding="ascii"),  # names the image: last
+        # names the image, so it comes last
+        TEXT: lambda path: path.write_text(text(grid), encoding="ascii"),
     }
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)

@@ -35,9 +35,9 @@ from pelorus.tracks import Indices
 
 FREE, FREE_MOST = 0.45, 2.0
 OCCUPIED = 8.0
-MARGIN = 2.0  # standard deviations that a ray stays away from its landmark
+MARGIN = 2.0  # standard deviations before the landmark at which its ray ends
 SEEN_LEAST = 3  # a landmark seen less often may be a mismatch
-DEPTH_SIGMA_MOST = 0.5  # of its distance: what is less certain tells nothing
+DEPTH_SIGMA_MOST = 0.5  # of its distance: a less certain landmark is left out
 UP_OVER_FRAMES = 50  # on either side, for the mean of the body's up
 
 CELLS_MOST = 25_000_000
@@ -45,7 +45,7 @@ RESOLUTIONS_M = (0.05, 0.1, 0.2, 0.5, 1.0)
 BORDER = 0.03  # of the longer side, and at least BORDER_CELLS
 BORDER_CELLS = 4
 CELLS_AT_ONCE = 1_000_000
-FAINT = 0.01  # of a landmark in its likeliest cell: less marks nothing
+FAINT = 0.01  # of a landmark in its likeliest cell: a smaller share marks nothing
 
 
 class Band(NamedTuple):
@@ -56,12 +56,12 @@ class Band(NamedTuple):
 
 
 EVERYTHING = Band(-np.inf, np.inf)
-CAR = Band(-0.3, 4.0)  # above the road, below the trees' crowns
+CAR = Band(-0.3, 4.0)  # from above the road to below the trees' crowns
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What was asked for; None: chosen by the data."""
+    """The user's choices; None: chosen by the data."""
 
     resolution_m: float | None = None
     band: Band | None = None
@@ -80,8 +80,8 @@ class Grid:
     origin_m: tuple[float, float]
     plane: Plane
     band: Band
-    path_m: Floats  # (n, 2): the body's way in it
-    landmarks: int  # that stand in it
+    path_m: Floats  # (n, 2): the body's path
+    landmarks: int  # in the grid
 
     @property
     def probability(self) -> Floats:
@@ -89,7 +89,7 @@ class Grid:
 
 
 def occupancy(seen: Sightings, wish: Wish) -> Grid:
-    """The grid; PelorusError where nothing stands in it or it would be absurdly large."""
+    """Builds the grid; raises PelorusError where it would be empty or absurdly large."""
     looked_at = plane.choose_for_map(seen.body_axes, seen.poses, seen.landmarks_W)
     band = wish.band or (EVERYTHING if seen.body_axes == BodyAxes.OTHER else CAR)
     up = _up(seen, looked_at)
@@ -121,10 +121,11 @@ def occupancy(seen: Sightings, wish: Wish) -> Grid:
 
 
 def _up(seen: Sightings, looked_at: Plane) -> Floats:
-    """(n, 3): the way up in the world at each frame.
+    """Returns (n, 3) the upward direction in the world at each frame.
 
-    The body's own, as a mean over some frames: the world of a long drive is not level to the end
-    (no sensor here knows gravity), and the body nods. Where it has no up, the viewer's direction.
+    It is the body's own, as a mean over some frames: the world of a long drive does not stay level
+    (no sensor here measures gravity), and the body pitches. Where the body has no up, it is the
+    viewer's direction.
     """
     if seen.body_axes == BodyAxes.OTHER:
         right, up = (axis.sign * np.eye(3)[axis.number] for axis in looked_at[:2])
@@ -139,7 +140,7 @@ def _up(seen: Sightings, looked_at: Plane) -> Floats:
 
 
 def _flat_covariance(spread: Floats, looked_at: Plane) -> Floats:
-    """(m, 3, 3) -> (m, 2, 2)."""
+    """Projects covariances: (m, 3, 3) -> (m, 2, 2)."""
     pick = np.zeros((2, 3))
     for row, axis in enumerate(looked_at[:2]):
         pick[row, axis.number] = axis.sign
@@ -147,19 +148,19 @@ def _flat_covariance(spread: Floats, looked_at: Plane) -> Floats:
 
 
 def _along(covariance: Floats, direction: Floats) -> Floats:
-    """Standard deviation along unit vectors."""
+    """Returns the standard deviation along unit vectors."""
     return np.asarray(np.sqrt(np.einsum("ni,nij,nj->n", direction, covariance, direction)))
 
 
 def _resolution(spread: Floats, points: Floats) -> float:
-    """As fine as half of the landmarks are certain and as a long drive allows, in steps."""
+    """Returns a cell size as fine as half of the landmarks and the drive's length allow."""
     sigma = float(np.median(np.sqrt(np.linalg.eigvalsh(spread)[:, 1])))
     fine = (step for step in RESOLUTIONS_M if step >= sigma)
     return next((step for step in fine if _cells(points, step) <= CELLS_MOST), RESOLUTIONS_M[-1])
 
 
 def _extent(points: Floats, step: float) -> tuple[Floats, Floats]:
-    """The sheet's lower corner, and how many cells it has in width and height."""
+    """Returns the sheet's lower corner, and its width and height in cells."""
     low, high = points.min(axis=0), points.max(axis=0)
     border = max(BORDER * float((high - low).max()), BORDER_CELLS * step)
     low = np.floor((low - border) / step) * step
@@ -171,7 +172,7 @@ def _cells(points: Floats, step: float) -> float:
 
 
 class _Sheet(NamedTuple):
-    """Where the cells lie: `low` the outer corner of [0, 0], `size` (width, height)."""
+    """The cells' places: `low` is the outer corner of [0, 0], `size` (width, height)."""
 
     low: Floats
     size: tuple[int, int]
@@ -193,7 +194,7 @@ class _Sheet(NamedTuple):
         return np.asarray(np.floor((points - self.low) / self.step).astype(np.intp))
 
     def add(self, sheet: Floats, cells: Indices, amount: Floats) -> None:
-        """Add amounts (n,) to cells (n, 2) of the flat sheet; what lies outside is left out."""
+        """Adds amounts (n,) to cells (n, 2) of the flat sheet; cells outside are left out."""
         inside = ((cells >= 0) & (cells < self.size)).all(axis=-1)
         number = cells[inside] @ np.array([1, self.size[0]])
         sheet += np.bincount(number, amount[inside], minlength=len(sheet))
@@ -206,13 +207,13 @@ class _Sheet(NamedTuple):
 
 
 def _rounded_up(x: float) -> float:
-    """To two digits."""
+    """Rounds up to two digits."""
     digits = 10 ** (np.floor(np.log10(x)) - 1)
     return float(np.ceil(x / digits) * digits)
 
 
 class _Rays(NamedTuple):
-    """What a ray needs to know of the landmarks."""
+    """The landmarks' values that rays need."""
 
     looked_at: Plane
     up: Floats
@@ -223,7 +224,7 @@ class _Rays(NamedTuple):
 
 
 def _free(sheet: _Sheet, seen: Sightings, rays: _Rays, range_m: float) -> Floats:
-    """Log-odds that the rays give each cell."""
+    """Returns the log-odds that the rays add to each cell."""
     eyes = rays.looked_at.flat(seen.camera_W)
     frame, landmark = _once(sheet, seen, eyes, rays.sure)
     way = rays.points[landmark] - eyes[frame]
@@ -237,7 +238,7 @@ def _free(sheet: _Sheet, seen: Sightings, rays: _Rays, range_m: float) -> Floats
     climb = (point_height - eye_height) / np.maximum(length, 1e-9)
     reach = np.minimum(length, range_m)
     out = sheet.empty()
-    order = np.argsort(reach, kind="stable")  # rays of like length share an array
+    order = np.argsort(reach, kind="stable")  # rays of similar length share an array
     each = max(1, int(CELLS_AT_ONCE * sheet.step / max(range_m, sheet.step)))
     starts = range(0, len(order), each)
     for part in progress((order[k : k + each] for k in starts), "following rays", len(starts)):
@@ -256,8 +257,9 @@ def _free(sheet: _Sheet, seen: Sightings, rays: _Rays, range_m: float) -> Floats
 def _once(
     sheet: _Sheet, seen: Sightings, eyes: Floats, sure: NDArray[np.bool_]
 ) -> tuple[Indices, Indices]:
-    """One sighting for each landmark and cell that the camera stood in: to look at the same point
-    from the same place again tells nothing new.
+    """Returns one sighting for each pair of a landmark and the camera's cell.
+
+    Looking again at the same point from the same place shows nothing new.
     """
     good = sure[seen.landmark]
     frame, landmark = seen.frame[good], seen.landmark[good]
@@ -267,10 +269,10 @@ def _once(
 
 
 def _occupied(sheet: _Sheet, points: Floats, spread: Floats) -> Floats:
-    """Log-odds that the landmarks give each cell.
+    """Returns the log-odds that the landmarks add to each cell.
 
-    Each counts as standing in the middle of its cell, so that a certain one marks one cell and not
-    two by halves. The variance of a place inside a cell, step^2 / 12, is added to its own.
+    Each counts as in the middle of its cell, so that a certain one marks one cell and not two by
+    halves. The variance of a place inside a cell, step^2 / 12, is added to its own.
     """
     out = sheet.empty()
     likeliest = sheet.step**2 / (2 * np.pi * np.sqrt(np.linalg.det(spread)))

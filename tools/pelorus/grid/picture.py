@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The occupancy grid as a picture: what a reader of the files makes of each cell."""
+"""Draws the occupancy grid as a reader of the files sees it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ UNKNOWN, FREE = "#C4C9CE", "#FFFFFF"
 WIDTH_IN, LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 12.0, 0.8, 0.2, 0.65, 0.85
 HEIGHT_IN = (3.0, 10.0)
 LEGEND_IN = 9.6
-DOT = 1.6  # points: an occupied cell that is smaller in the picture would be lost in it
+DOT = 1.6  # points: least size of an occupied cell, so that it stays visible
 
 
 def draw(grid: Grid, title: str) -> Figure:
-    """White is free, black is occupied, grey is not known; the body's path in blue."""
+    """Draws free cells white, occupied ones black, unknown ones grey; the body's path in blue."""
     found = files.cells(grid)
     height, width = found.shape
     across = WIDTH_IN - LEFT_IN - RIGHT_IN
@@ -50,7 +50,7 @@ def draw(grid: Grid, title: str) -> Figure:
 
 
 def fill(axes: Axes, grid: Grid) -> None:
-    """The cells and the path."""
+    """Draws the cells and the path."""
     found = files.cells(grid)
     shade = np.select([found == files.FREE, found == files.OCCUPIED], [0, 2], 1)
     x, y = grid.origin_m

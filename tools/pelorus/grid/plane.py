@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From where trajectories and landmarks are looked at."""
+"""The plane in which trajectories and landmarks are drawn."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ class Axis(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """`why` names the choice in words."""
+    """A plane of the world; `why` gives the reason of the choice in words."""
 
     right: Axis
     up: Axis
     why: str
 
     def flat(self, points: Floats) -> Floats:
-        """(..., 3) -> (..., 2)."""
+        """Projects points: (..., 3) -> (..., 2)."""
         return np.stack((self.right.of(points), self.up.of(points)), axis=-1)
 
 
 def choose(axes: BodyAxes, poses: Poses) -> Plane:
-    """From above, where the body's axes tell what is up; else the plane of largest extent."""
+    """Returns the view from above, if the body's axes define up; else of the largest extent."""
     if axes == BodyAxes.OTHER:
         return _largest(poses.p)
     up_B = np.array([0.0, 0.0, 1.0 if axes == BodyAxes.FORWARD_LEFT_UP else -1.0])
@@ -58,8 +58,9 @@ def choose(axes: BodyAxes, poses: Poses) -> Plane:
 
 
 def choose_for_map(axes: BodyAxes, poses: Poses, landmarks_W: Floats) -> Plane:
-    """As `choose`; but where no axes tell what is up, the plane in which the landmarks lie most
-    nearly, seen from the positive end of its normal.
+    """Returns the plane of `choose`, or without known axes the landmarks' plane.
+
+    The latter is the plane to which the landmarks are nearest, seen from its normal's positive end.
     """
     if axes != BodyAxes.OTHER:
         return choose(axes, poses)
@@ -69,7 +70,7 @@ def choose_for_map(axes: BodyAxes, poses: Poses, landmarks_W: Floats) -> Plane:
 
 
 def _along(vertical: int, positive: bool, why: str) -> Plane:
-    """Seen along an axis of the world, from its positive end or from the other one."""
+    """Returns the view along an axis of the world, from its positive or its negative end."""
     right, up = (AXES.index(name) for name in SEEN_FROM[AXES[vertical]])
     if positive:
         return Plane(Axis(right, 1), Axis(up, 1), why)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which landmark was seen from where, read from what a filter left behind (a result or a log)."""
+"""Reads which landmark was seen from where, in a result or a log of a filter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from pelorus.motion import Times
 from pelorus.se3 import Poses
 from pelorus.tracks import Indices
 
-SIGMA_LEAST_M = 0.01  # nobody knows a point better: the frames round, the corner of a house is none
+# no point is known better: frames round, and the corner of a house is no point
+SIGMA_LEAST_M = 0.01
 POSE_SIZE, POINT_SIZE = 6, 3
 Kind = TypeVar("Kind", bound=Message)
 
@@ -47,7 +48,7 @@ class Sightings:
 
 
 def sightings(path: Path, messages: list[Message]) -> Sightings:
-    """Landmarks, poses, and who saw whom; PelorusError where there is no landmark."""
+    """Returns landmarks, poses and sightings; raises PelorusError where there is no landmark."""
     header = _all(messages, Header)[0]
     poses = [m for m in _all(messages, Pose) if m.after_stereo and m.knows_covariance]
     poses = list({pose.t_ns: pose for pose in poses}.values())
@@ -94,7 +95,7 @@ def _all(messages: list[Message], kind: type[Kind]) -> list[Kind]:
 
 
 def _index(t_ns: Times, wanted: Times) -> tuple[Indices, NDArray[np.bool_]]:
-    """Where the wanted times stand among the ascending ones, and whether they do."""
+    """Returns the wanted times' places among the ascending ones, and whether they are there."""
     at = np.searchsorted(t_ns, wanted)
     found = at < len(t_ns)
     found[found] = t_ns[at[found]] == wanted[found]
@@ -102,10 +103,11 @@ def _index(t_ns: Times, wanted: Times) -> tuple[Indices, NDArray[np.bool_]]:
 
 
 def _without_pose(S: Floats, P: Floats, T: Poses, points: Floats) -> Floats:
-    """S - J P J^T, J = R [I, -[s]x], s the point in the body (docs/MATH.md, the pose's error).
+    """Returns S - J P J^T, J = R [I, -[s]x], s the point in the body (docs/MATH.md, the pose's
+    error).
 
-    Pose and landmark are correlated, so the difference may be less than zero in a direction: there
-    the landmark is as certain as can be.
+    Pose and landmark are correlated, so the difference may be negative in a direction: there the
+    landmark has no variance.
     """
     s = se3.apply(se3.inverse(T), points)
     J = np.concatenate((T.R, -T.R @ se3.skew(s)), axis=-1)
@@ -117,7 +119,7 @@ def _without_pose(S: Floats, P: Floats, T: Poses, points: Floats) -> Floats:
 def _who_saw_whom(
     stereos: list[Stereo], t_ns: Times, placed: list[Landmark]
 ) -> tuple[Indices, Indices]:
-    """Frame and landmark of each observation.
+    """Returns frame and landmark of each observation.
 
     An id may come back after its landmark was evicted: a sighting belongs to the first landmark of
     its id that was last seen at that time or later. `placed` is sorted by id, then time.
@@ -128,7 +130,7 @@ def _who_saw_whom(
         return none, none
     at, id = np.array(seen, np.int64).T
     owners = np.array([(m.id, m.t_ns) for m in placed], np.int64)
-    # Times as their places among all times, so that id and time fit one number.
+    # Times as indices among all times, so that id and time fit one number.
     times = np.unique(np.concatenate((at, owners[:, 1])))
     key = owners[:, 0] * len(times) + np.searchsorted(times, owners[:, 1])
     owner = np.searchsorted(key, id * len(times) + np.searchsorted(times, at))

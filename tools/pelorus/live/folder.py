@@ -29,7 +29,7 @@ class Folder:
         self.name = asked.source
         self._streams = euroc.read(Path(asked.source), given)
         self.calibrated = self._streams.calibrated
-        self.remarks = self._streams.told
+        self.remarks = self._streams.all_remarks
 
     def measured(self) -> Iterator[Measured]:
         for _, _, one in heapq.merge(self._readings(), self._pictures(), key=lambda e: e[:2]):

@@ -101,11 +101,11 @@ class Odometry:
 
     def add(self, datum: Datum) -> list[Odom]:
         """Returns what is known after each frame that this message lets go on."""
-        return [odom for due in self.sequencer.add(datum) for odom in self._use(due)]
+        return [odom for expected in self.sequencer.add(datum) for odom in self._use(expected)]
 
     def finish(self) -> list[Odom]:
         """Uses what still waits, and ends the log."""
-        rest = [odom for due in self.sequencer.flush() for odom in self._use(due)]
+        rest = [odom for expected in self.sequencer.flush() for odom in self._use(expected)]
         self._end()
         return rest
 
@@ -157,18 +157,18 @@ class Odometry:
 
     # --- drives
 
-    def _use(self, due: Datum | ClockStep) -> Iterator[Odom]:
-        if isinstance(due, ClockStep):
-            self._follow(due)
+    def _use(self, expected: Datum | ClockStep) -> Iterator[Odom]:
+        if isinstance(expected, ClockStep):
+            self._follow(expected)
             return
         if self.drive is None:
-            start = None if self._start is None else replace(self._start, t_ns=due.t_ns)
+            start = None if self._start is None else replace(self._start, t_ns=expected.t_ns)
             self.drive, self._start = self._new_drive(start), None
         if self._resume is not None:
             moved, self._resume = self._resume, None
-            self._go_on(self.drive, due.t_ns, moved)
-        estimate = self.drive.use(due)
-        if estimate is None and not isinstance(due, Stereo) and self._is_silent(due.t_ns):
+            self._go_on(self.drive, expected.t_ns, moved)
+        estimate = self.drive.use(expected)
+        if estimate is None and not isinstance(expected, Stereo) and self._is_silent(expected.t_ns):
             estimate = self.drive.estimate()
         if estimate is not None and estimate.started:
             self._told_ns = estimate.t_ns

@@ -15,7 +15,7 @@ import numpy as np
 
 from pelorus.converters.streams import FORCES_MPS2
 from pelorus.errors import PelorusError
-from pelorus.faults.sync import Apart
+from pelorus.faults.sync import PictureDelay
 from pelorus.frames import Header, Imu, Process, Stereo
 from pelorus.inertial import Inertial
 from pelorus.online.drive import LOST
@@ -168,7 +168,7 @@ class Pipeline:
             self.last = odoms[-1]
         return odoms
 
-    def _doubted(self, odom: Odom, apart: Apart) -> Odom:
+    def _doubted(self, odom: Odom, apart: PictureDelay) -> Odom:
         """Halves that were not taken together make points of no place: by more than a pixel's
         noise the covariance holds nothing any more."""
         drive = None if self.odometry is None else self.odometry.drive

@@ -7,7 +7,7 @@ from collections import deque
 
 import numpy as np
 
-from pelorus.faults.sync import Apart, apart
+from pelorus.faults.sync import PictureDelay, apart
 from pelorus.frames import Camera
 from pelorus.online.eyes import Seen
 from pelorus.tracks import Tracks
@@ -19,7 +19,7 @@ class Together:
     """Judges the last frames now and then; `found` is what they show, None while they are right."""
 
     def __init__(self, camera: Camera) -> None:
-        self.found: Apart | None = None
+        self.found: PictureDelay | None = None
         self._camera = camera
         self._frames: deque[tuple[int, Seen]] = deque(maxlen=FRAMES)
         self._count = 0

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""`pelorus report`: several replays of one recording, compared in pictures, a table and words."""
+"""`pelorus report` compares several replays of one recording in pictures, a table and words."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `report`, `explain` and `check` found, as the page tells it."""
+"""Makes the page's answer from what `report`, `explain` and `check` found."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pelorus.explain.log import log_of
 from pelorus.frames import Message
 from pelorus.report.about import tables_of
 from pelorus.report.footage import CAPTION, Footage
-from pelorus.report.page import Answer, Event, Table
+from pelorus.report.page import Answer, Event, PageTable
 from pelorus.report.spectra import drawings
 
 if TYPE_CHECKING:
     from pelorus.check.checked import Checked
     from pelorus.report.comparison import Comparison
 
-UNEXPLAINED_MOST = 20  # spells that are told on a page
+UNEXPLAINED_MOST = 20  # spells that the page lists
 MEANING = (
     "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
     "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is expected. "
@@ -40,7 +40,7 @@ ALSO = (
 
 
 def with_footage(answer: Answer, shown: Footage) -> Answer:
-    """The same with pictures."""
+    """Returns the answer with pictures."""
     left_out = (
         f"{len(shown.moments)} of {shown.frames} frames are shown: events, and some all along."
     )
@@ -48,7 +48,9 @@ def with_footage(answer: Answer, shown: Footage) -> Answer:
 
 
 def with_setup(answer: Answer, messages: Sequence[Message]) -> Answer:
-    """The same with settings, calibration and remarks, and with what no time runs through."""
+    """Returns the answer with settings, calibration and remarks, and drawings without a time
+    axis.
+    """
     drawn = tuple(drawings(log_of(messages)))
     return replace(answer, tables=[*answer.tables, *tables_of(messages)], drawings=drawn)
 
@@ -56,10 +58,10 @@ def with_setup(answer: Answer, messages: Sequence[Message]) -> Answer:
 def of_explanation(
     found: Explanation,
     title: str,
-    tables: Sequence[Table] = (),
+    tables: Sequence[PageTable] = (),
     facts: str = "",
 ) -> Answer:
-    """Of a log."""
+    """Returns the answer to an explanation of a log."""
     verdict = found.verdict
     return Answer(
         title,
@@ -86,7 +88,7 @@ def _settings(verdict: Verdict) -> list[str]:
 
 
 def _events(found: Explanation) -> list[Event]:
-    """In the order of time, and health that nothing explains among them."""
+    """Returns the events in the order of time, with unexplained spells among them."""
     events = [_event(found, episode) for episode in found.episodes]
     for spell in found.unexplained[:UNEXPLAINED_MOST]:
         begin, end = (found.seconds(t) for t in (spell.from_ns, spell.to_ns))
@@ -104,9 +106,12 @@ def of_comparison(
     lines: Sequence[str],
     found: Explanation,
     pictures: Sequence[tuple[str, str, Path]],
-    tables: Sequence[Table] = (),
+    tables: Sequence[PageTable] = (),
 ) -> Answer:
-    """Of a report; `lines` are its remarks, `tables` stand below that of the runs."""
+    """Returns the answer of a report.
+
+    `lines` are its remarks; `tables` come below that of the runs.
+    """
     from pelorus.report import words  # noqa: PLC0415 - it looks at runs, which load slowly
 
     meaning = MEANING + (ALSO if len(compared.runs) > 2 else "")
@@ -122,10 +127,10 @@ def of_comparison(
         [*_why(found.verdict), _sentence(found.lines()[0]), *lines, *found.setup],
         changes=_settings(found.verdict),
         events=_events(found),
-        tables=[Table("Runs", rows, meaning), *tables],
+        tables=[PageTable("Runs", rows, meaning), *tables],
         pictures=pictures,
         commands=commands,
-        lists=[("Health", compared.main.health.told(compared.origin_ns))],
+        lists=[("Health", compared.main.health.lines(compared.origin_ns))],
     )
 
 
@@ -146,7 +151,7 @@ def _remarks(found: Checked) -> list[str]:
 
 
 def of_check(found: Checked, title: str, found_in: Explanation | None) -> Answer:
-    """Of a check; `found_in` explains the log of the settings that it proposes."""
+    """Returns the answer of a check; `found_in` explains the log with the proposed settings."""
     tuned = {} if found.tuned is None else found.tuned.settings
     settings = [f"{name} = {value}" for name, value in tuned.items()]
     rows = [("", "before", "after"), *found.rows]
@@ -158,7 +163,7 @@ def of_check(found: Checked, title: str, found_in: Explanation | None) -> Answer
         lines=[*found.verdict.doubts, *found.changes],
         changes=settings,
         events=[] if found_in is None else _events(found_in),
-        tables=[Table("Before and after", rows)] if found.rows else [],
+        tables=[PageTable("Before and after", rows)] if found.rows else [],
         lists=[
             *([("Health", ["with these settings", *found.spells])] if found.spells else []),
             ("All remarks", ["what was looked at", *_remarks(found)]),

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the page says in tables of one log, or of two side by side: settings that differ, figures,
-drift by length.
-"""
+"""Tables of one log, or of two side by side: settings that differ, figures, drift by length."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from pelorus.explain.explanation import Explanation
 from pelorus.frames import Config, Message
 from pelorus.relative_error import Drift, drifts
 from pelorus.report.curves import BESIDE
-from pelorus.report.page import Table
+from pelorus.report.page import PageTable
 from pelorus.report.words import NONE, number
 from pelorus.settings import describe
 
@@ -24,8 +22,8 @@ DRIFT = (
 )
 
 
-class Told(NamedTuple):
-    """A log by its name."""
+class NamedLog(NamedTuple):
+    """A log with its name."""
 
     name: str
     found: Explanation
@@ -33,8 +31,8 @@ class Told(NamedTuple):
     messages: Sequence[Message]
 
 
-def drift_table(logs: Sequence[Told]) -> list[Table]:
-    """None where no log has a truth."""
+def drift_table(logs: Sequence[NamedLog]) -> list[PageTable]:
+    """Returns a table of drift by length; none where no log has a truth."""
     by_log = {
         log.name: {drift.length_m: drift for drift in drifts(log.accuracy)}
         for log in logs
@@ -49,7 +47,7 @@ def drift_table(logs: Sequence[Told]) -> list[Table]:
     for length in lengths:
         cells = [_cells(found.get(length)) for found in by_log.values()]
         rows.append([f"{length:g} m", *itertools.chain(*cells)])
-    return [Table("Drift by length (RPE)", rows, DRIFT, folded=True)]
+    return [PageTable("Drift by length (RPE)", rows, DRIFT, folded=True)]
 
 
 def _cells(drift: Drift | None) -> list[str]:
@@ -59,17 +57,19 @@ def _cells(drift: Drift | None) -> list[str]:
     return [*(f"{x:.3g}" for x in figures), str(drift.starts)]
 
 
-def side_by_side(first: Told, second: Told) -> list[Table]:
-    """Figures of both, and the settings in which they differ."""
+def side_by_side(first: NamedLog, second: NamedLog) -> list[PageTable]:
+    """Returns tables of both logs' figures, and of the settings in which they differ."""
     head = ("", first.name, BESIDE)
     mine, theirs = dict(_figures(first)), dict(_figures(second))
-    tables = [Table("Side by side", [head, *((key, x, theirs[key]) for key, x in mine.items())])]
+    tables = [
+        PageTable("Side by side", [head, *((key, x, theirs[key]) for key, x in mine.items())])
+    ]
     if settings := list(_settings(first, second)):
-        tables.append(Table("Settings that differ", [head, *settings]))
+        tables.append(PageTable("Settings that differ", [head, *settings]))
     return tables
 
 
-def _figures(log: Told) -> Iterator[tuple[str, str]]:
+def _figures(log: NamedLog) -> Iterator[tuple[str, str]]:
     cause = log.found.first
     yield "first cause", "nothing" if cause is None else str(cause.cause)
     yield "events", str(len(log.found.episodes))
@@ -84,7 +84,7 @@ def _figures(log: Told) -> Iterator[tuple[str, str]]:
         yield title, number(figures.get(key))
 
 
-def _settings(first: Told, second: Told) -> Iterator[tuple[str, ...]]:
+def _settings(first: NamedLog, second: NamedLog) -> Iterator[tuple[str, ...]]:
     mine, theirs = (_in_force(log.messages) for log in (first, second))
     for id in sorted(mine.keys() | theirs.keys()):
         here, there = mine.get(id), theirs.get(id)

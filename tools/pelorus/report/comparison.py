@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""All runs over one recording, beside the truth where there is one.
+"""All runs over one recording, compared with the truth where there is one.
 
 The trace of the whole map's covariance is the course report's figure 2. The course's state holds
-every landmark of the recording from the first frame on. Ours holds those in its slots, and what the
-report draws is put together from what it leaves behind:
+every landmark of the recording from the first frame on. Ours holds those in its slots, so the
+report adds up what it leaves behind:
 
 - the state's own trace, pose and landmarks in the slots, of each frame;
 - a landmark that has left keeps the covariance with which it left (its LANDMARK frame);
 - one that was not seen yet stands at its prior, 3 landmark-sigma^2: 6 m^2 with the report's
   Sigma_m = 2 I, which also stands in where landmarks start from the pixels.
 
-Seen means: with a disparity of which a landmark could be made. What was seen and never taken, for
-it was too far off, is no part of the map and of the sum.
+Seen means: with a disparity of which a landmark could be made. Points that were never taken, for
+they were too far off, are not part of the map and of the sum.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PRIOR_VARIANCE_M2 = 2.0  # Sigma_m of the report, an axis
 
 
 class Traces(NamedTuple):
-    """After each frame: of the state as it is, of the whole map; NaN where P is broken."""
+    """Traces after each frame: of the state, and of the whole map; NaN where P is invalid."""
 
     t_ns: Times
     active: Floats
@@ -47,7 +47,7 @@ class Traces(NamedTuple):
 
 
 def traces(messages: Sequence[Message], t_ns: Times, active: Floats) -> Traces:
-    """From a result's messages and the state's trace at the frames' times."""
+    """Returns the traces by a result's messages and the state's trace at the frames' times."""
     least_px = in_force(messages, "min-disparity") or 0.0
     sigma_m = in_force(messages, "landmark-sigma") or 0.0
     prior = 3 * (sigma_m**2 or PRIOR_VARIANCE_M2)
@@ -81,14 +81,14 @@ COURSE = "course"
 
 @dataclass(frozen=True)
 class Comparison:
-    """`runs` in the order of the table."""
+    """The runs in the order of the table."""
 
     subject: Subject
     runs: list[Run]
 
     @cached_property
     def accuracy(self) -> dict[str, Accuracy]:
-        """By the run's name; empty without truth."""
+        """Returns the accuracy by the run's name; empty without truth."""
         truth = self.subject.truth
         if truth is None:
             return {}
@@ -112,7 +112,7 @@ class Comparison:
 
     @cached_property
     def grid(self) -> Grid | None:
-        """The map that the main run made; None where nothing stands in it."""
+        """Returns the occupancy grid of the main run; None if it is empty."""
         try:
             return occupancy(sightings(self.main.log, self.main.messages), Wish())
         except PelorusError:
@@ -124,7 +124,7 @@ class Comparison:
 
     @cached_property
     def whole_map(self) -> Traces:
-        """Of the course's filter, whose landmarks have their covariance in metres."""
+        """Returns the course filter's traces; its landmarks have their covariance in metres."""
         run = self.run(COURSE)
         return traces(run.messages, run.frames.t_ns, run.frames["trace"])
 
@@ -133,5 +133,5 @@ class Comparison:
         return min(int(run.frames.t_ns[0]) for run in self.runs)
 
     def seconds(self, t_ns: Times) -> Floats:
-        """Time since the first frame."""
+        """Returns times since the first frame, s."""
         return np.asarray((t_ns - self.origin_ns) * 1e-9)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What the page draws of one log: curves over time, health with its reasons, the way and the map,
-what became of each landmark, and the evidence.
+"""The data that the page draws of one log.
 
-Curves are whole. Of landmarks and rejections there may be too many for a page: the oldest and least
-seen are left out, and `left_out` says how many.
+They are curves over time, health with its reasons, path and map, the history of each landmark, and
+the evidence. Curves are whole. Landmarks and rejections may be too many for a page: the oldest and
+least seen are left out, and `left_out` says how many.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from pelorus.wire import header_of_messages
 SIGMAS = 3.0
 BAND = 0.95
 FRAMES_MOST = 150_000  # two hours at 20 Hz
-BESIDE = "beside"  # what curves of another log are called
+BESIDE = "beside"  # the suffix of another log's curves
 NO_HEALTH = 255
 NOTHING = "Nothing to draw: in no frame of this log is it known and not zero."
 TURNS = ("roll", "pitch", "yaw")
-SHAPES = 200  # ellipsoids along the way
+SHAPES = 200  # ellipsoids along the path
 INSIDE = (
     "In body axes, first poses aligned, and three sigma of the filter's own covariance: an honest "
     "filter stays inside."
@@ -47,14 +47,14 @@ RHO_THETA = tuple(f"var_{part}_{axis}" for part in ("rho", "theta") for axis in 
 
 
 class Other(NamedTuple):
-    """Another run over the same recording, drawn beside."""
+    """Another run over the same recording, for comparison."""
 
     trajectory: Trajectory
     accuracy: Accuracy | None
 
 
 class Curves:
-    """Builds what the page reads, as JSON that refers to columns in a Packer."""
+    """Builds the page's data: JSON that refers to columns in a Packer."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class Curves:
         others: Mapping[str, Other] | None = None,
         beside: Curves | None = None,
     ) -> None:
-        """`beside` is another log: each of its curves is drawn beside its like."""
+        """Takes a log; each curve of another log, `beside`, is drawn with its counterpart."""
         self.packer = Packer()
         self.left_out: list[str] = []
         self._others = others or {}
@@ -81,7 +81,9 @@ class Curves:
         return int(self._frames.t_ns[0])
 
     def _thinned(self, frames: FrameTable) -> FrameTable:
-        """Of more frames than a browser holds every nth, and those that were not good."""
+        """Returns every nth frame where a browser cannot hold all, with those that were not
+        good.
+        """
         count = len(frames.t_ns)
         if count <= FRAMES_MOST:
             return frames
@@ -97,11 +99,11 @@ class Curves:
         return FrameTable(frames.t_ns[kept], columns, frames.by_imu)
 
     def _seconds(self, t_ns: Times) -> Floats:
-        """Since the first frame; a clock that went back stands still."""
+        """Returns times since the first frame, s; a clock that went back stands still."""
         return np.asarray(np.maximum.accumulate((t_ns - self.origin_ns) * 1e-9))
 
     def json(self) -> dict[str, Any]:
-        """All of it but the columns."""
+        """Returns the data without the columns."""
         return {
             "t": self.packer.add_exactly(np.round(self._t * 1e3), "u4"),  # ms
             "health": self.packer.add_exactly(_shown_health(self._frames), "u1"),
@@ -140,7 +142,7 @@ class Curves:
         return {"title": title, "unit": unit, "about": about, "lines": list(lines), **more}
 
     def _packed(self, chart: dict[str, Any]) -> dict[str, Any]:
-        least = 0.0 if chart.get("log") else -np.inf  # a logarithm shows nothing else
+        least = 0.0 if chart.get("log") else -np.inf  # a logarithm shows only positive values
         if not any((np.nan_to_num(x, nan=-np.inf) > least).any() for _, x in chart["lines"]):
             return chart | {"lines": [], "empty": chart.get("empty", NOTHING)}
         chart.pop("empty", None)
@@ -152,8 +154,9 @@ class Curves:
         return chart | {"lines": columns}
 
     def lines(self, like: Mapping[str, Any]) -> Iterator[tuple[int, tuple[str, Floats]]]:
-        """The curves of the chart of the same title, with the numbers of those that they stand
-        beside; no bands.
+        """Yields the curves of the chart of the same title, with the numbers of their counterparts.
+
+        Bands are left out.
         """
         names = [name for name, _ in like["lines"]]
         for chart in self._own_charts:
@@ -167,7 +170,7 @@ class Curves:
         return list(self._charts())
 
     def _at_own(self, other: Curves, values: Floats) -> Floats:
-        """Another log's values at the frames of this one: by stamps, else by the time since the
+        """Returns another log's values at this one's frames: by stamps, else by time since the
         first frame.
         """
         same = np.isin(self._frames.t_ns, other._frames.t_ns).mean() > 0.5
@@ -223,7 +226,7 @@ class Curves:
         ]
 
     def _spread(self, t_ns: Times, values: Floats) -> Floats:
-        """At all frames: NaN where there is no truth."""
+        """Returns the values at all frames: NaN where there is no truth."""
         out = np.full((len(self._frames.t_ns), values.shape[1]), np.nan)
         order = np.argsort(t_ns, kind="stable")
         at = np.searchsorted(t_ns[order], self._frames.t_ns)
@@ -233,7 +236,7 @@ class Curves:
         return out
 
     def _motion(self) -> Iterator[dict[str, Any]]:
-        """How the body goes and how it is turned, beside the truth where there is one."""
+        """Yields the charts of velocity and attitude, with the truth where there is one."""
         frames = self._frames
         v = [(axis, frames[f"v{axis}_mps"]) for axis in AXES]
         yield self._chart("Velocity", "m/s", "Of the body, along its own axes.", v)
@@ -278,7 +281,7 @@ class Curves:
         for letter, title, unit in kinds:
             values = frames.stack(*(f"bias_{letter}{axis}" for axis in AXES))
             if not np.nan_to_num(values).any():
-                continue  # they are not estimated
+                continue  # not estimated
             variance = frames.stack(*(f"var_bias_{letter}{axis}" for axis in AXES))
             lines = [(axis, values[:, k]) for k, axis in enumerate(AXES)]
             sigma = np.sqrt(np.clip(variance, 0, None)).max(axis=1)
@@ -376,7 +379,7 @@ class Curves:
         }
 
     def _shapes(self) -> dict[str, Any]:
-        """Ellipsoids of the position at some frames all along the way, in the world."""
+        """Returns position ellipsoids in the world, at some frames all along the path."""
         assert self._found is not None
         trajectory, P = self._found
         some = np.unique(np.linspace(0, len(P) - 1, min(len(P), SHAPES)).astype(int))
@@ -408,13 +411,13 @@ _PARTS = (slice(0, 3), slice(3, 6))
 
 
 def _shown_health(frames: FrameTable) -> Floats:
-    """As told; what waits for its start has lost nothing yet."""
+    """Returns the health; frames before the start count as good."""
     begun = np.logical_or.accumulate(frames.reasons & NOT_STARTED == 0)
     return np.where(begun, frames["health"], len(schema.HEALTHS))
 
 
 def _turns_deg(quaternion: Floats) -> Floats:
-    """(n, 3) roll, pitch and yaw; NaN where there is none."""
+    """Returns (n, 3) roll, pitch and yaw; NaN where there is none."""
     out = np.full((len(quaternion), 3), np.nan)
     known = np.isfinite(quaternion).all(axis=1)
     if known.any():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Drawings that no time runs through, as SVG: they need no script and no other package."""
+"""Drawings without a time axis, as SVG: they need no script and no other package."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pelorus.layout import Floats
 
 WIDTH, HEIGHT, LEFT, BOTTOM, TOP, RIGHT = 560, 240, 58, 34, 10, 10
 TICKS = 5
-DECADES_MOST = 8  # below the largest value; what is smaller is nothing
+DECADES_MOST = 8  # below the largest value; smaller ones are drawn as nothing
 
 
-class Axis:
-    """Values to pixels, along one side."""
+class PlotAxis:
+    """Maps values to pixels along one side."""
 
     def __init__(self, low: float, high: float, span: tuple[float, float], log: bool) -> None:
         self._log = log
@@ -51,15 +51,15 @@ def plot(
     units: tuple[str, str],
     log: tuple[bool, bool] = (False, False),
 ) -> str:
-    """Lines over x; `units` name the axes."""
+    """Draws lines over x; `units` name the axes."""
     values = np.concatenate([y[np.isfinite(y)] for _, y in lines])
     values = values[values > 0] if log[1] else values
     if not len(values) or not len(x):
         return ""
     high = float(values.max())
     low = max(float(values.min()), high * 10.0**-DECADES_MOST) if log[1] else min(0.0, values.min())
-    across = Axis(float(x[0]), float(x[-1]), (LEFT, WIDTH - RIGHT), log[0])
-    up = Axis(low, high * (1 if log[1] else 1.05), (HEIGHT - BOTTOM, TOP), log[1])
+    across = PlotAxis(float(x[0]), float(x[-1]), (LEFT, WIDTH - RIGHT), log[0])
+    up = PlotAxis(low, high * (1 if log[1] else 1.05), (HEIGHT - BOTTOM, TOP), log[1])
     out = [_grid(across, up, units)]
     for k, (name, y) in enumerate(lines):
         with np.errstate(invalid="ignore"):
@@ -75,7 +75,7 @@ def plot(
     return _svg(WIDTH, HEIGHT, "".join(out))
 
 
-def _grid(across: Axis, up: Axis, units: tuple[str, str]) -> str:
+def _grid(across: PlotAxis, up: PlotAxis, units: tuple[str, str]) -> str:
     out = []
     for tick in across.ticks():
         x = float(across.at(tick))
@@ -95,8 +95,9 @@ def _grid(across: Axis, up: Axis, units: tuple[str, str]) -> str:
 
 
 def arrows(at: Floats, way: Floats, heat: Floats, size: tuple[float, float], times: float) -> str:
-    """Arrows (n, 2) at places (n, 2) of a picture, `times` as long as they are; dots of the area of
-    `heat` (n,), 1 at most.
+    """Draws arrows (n, 2) at places (n, 2) of a picture, enlarged `times`.
+
+    Dots have the area of `heat` (n,), 1 at most.
     """
     scale = WIDTH / size[0]
     height = size[1] * scale

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 from pelorus.explain.explanation import Explanation
-from pelorus.explain.log import Log, log_of
+from pelorus.explain.log import FilterLog, log_of
 from pelorus.extras import extra
 from pelorus.frames import Message
 from pelorus.motion import Times, nearest
@@ -34,7 +34,7 @@ MOMENTS_MOST = 16
 WIDTH_PX = 560  # of a picture on the page
 QUALITY = 55  # of WebP: some 20 KB a picture
 TAIL_FRAMES = 5
-RESIDUAL_TIMES = 5.0  # by how much they are drawn longer
+RESIDUAL_TIMES = 5.0  # enlargement of the drawn residuals
 GREEN, RED, ORANGE = (63, 208, 160), (255, 70, 40), (255, 190, 60)
 BAGS = (".bag", ".mcap", ".db3")
 CAPTION = (
@@ -45,7 +45,7 @@ CAPTION = (
 
 
 class Shown(NamedTuple):
-    """One of them, as WebP."""
+    """A picture, as WebP."""
 
     t_s: float  # since the first frame
     words: str
@@ -53,14 +53,14 @@ class Shown(NamedTuple):
 
 
 class Footage(NamedTuple):
-    """`frames` is how many the log has."""
+    """The pictures; `frames` is the number of frames in the log."""
 
     moments: list[Shown]
     frames: int
 
 
 class _Source(NamedTuple):
-    """Left pictures in order; times are on the log's clock, None where they are its frames."""
+    """Left pictures in order; times are on the log's clock, None where pictures are its frames."""
 
     where: Path
     t_ns: Times | None
@@ -74,8 +74,9 @@ def footage(
     source: Path,
     calibration: Sequence[Path] = (),
 ) -> Footage:
-    """PelorusError where the pictures are not this log's. `calibration` of raw ones, where they do
-    not bring it.
+    """Returns the pictures of a log; raises PelorusError where they are not this log's.
+
+    `calibration` is for raw pictures that do not bring their own.
     """
     log = log_of(messages)
     wanted = moments(log, found)
@@ -101,9 +102,9 @@ def footage(
 # --- which moments --------------------------------------------------------------------------------
 
 
-def moments(log: Log, found: Explanation) -> dict[int, str]:
-    """Frames by number, and why: before and after each event begins, where most is rejected in it,
-    and some all along.
+def moments(log: FilterLog, found: Explanation) -> dict[int, str]:
+    """Returns frames by number, with a reason: before and after each event begins, its worst,
+    and some evenly.
     """
     wanted: dict[int, str] = {}
     gated = log.column("gated")
@@ -168,7 +169,7 @@ def _of_streams(streams: Any, source: Path) -> _Source:
 
 
 def _of_folder(folder: Path) -> _Source:
-    """Rectified ones of the left camera."""
+    """Returns rectified pictures of the left camera in a folder."""
     by_name = images.pictures(folder)
     names = sorted(by_name, key=lambda name: (len(name), name))
     low, high = images.NS_DIGITS
@@ -177,8 +178,8 @@ def _of_folder(folder: Path) -> _Source:
     return _Source(folder, t_ns, len(names), (images.gray(by_name[name]) for name in names))
 
 
-def _frames(source: _Source, log: Log) -> NDArray[np.int64]:
-    """The log's frame of each picture, -1 where it has none."""
+def _frames(source: _Source, log: FilterLog) -> NDArray[np.int64]:
+    """Returns the log's frame of each picture, -1 where it has none."""
     count = len(log.t_ns)
     if source.t_ns is None:
         if source.pictures != count:
@@ -204,17 +205,17 @@ def _frames(source: _Source, log: Log) -> NDArray[np.int64]:
 
 
 class _Artist:
-    def __init__(self, log: Log) -> None:
+    def __init__(self, log: FilterLog) -> None:
         self._log = log
 
     def draw(self, picture: Gray, k: int, where: Path) -> bytes:
         height, width = picture.shape
         header = self._log.header
-        due = (header.image_width_px, header.image_height_px)
-        if due[0] and (width, height) != due:
+        expected = (header.image_width_px, header.image_height_px)
+        if expected[0] and (width, height) != expected:
             raise PelorusError(
                 f"{where}: pictures of {width} x {height} pixels, and the log's are "
-                f"{due[0]} x {due[1]}: the rectified ones are expected"
+                f"{expected[0]} x {expected[1]}: the rectified ones are expected"
             )
         scale = WIDTH_PX / width
         size = (WIDTH_PX, round(height * scale))
@@ -242,7 +243,7 @@ class _Artist:
         return set() if evidence is None else set(evidence.rejected["id"].tolist())
 
     def _ways(self, k: int) -> dict[int, list[list[float]]]:
-        """Of the ids of this frame, in the left picture, oldest first."""
+        """Returns the tails of this frame's ids in the left picture, oldest point first."""
         ways: dict[int, list[list[float]]] = {id: [] for id in self._log.frames[k].ids.tolist()}
         for frame in self._log.frames[max(k - TAIL_FRAMES, 0) : k + 1]:
             for id, at in zip(frame.ids.tolist(), frame.pixels[:, :2].tolist(), strict=True):

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What the page knows of each landmark: where it is and how well, when it was seen, and when and
-why it was rejected.
+"""The page's data on each landmark: place and covariance, when seen, when and why rejected.
 
-There may be too many for a page: those seen least often are left out, and of the rejections all but
-every nth.
+There may be too many for a page: those seen least often are left out, and all but every nth of the
+rejections.
 """
 
 from __future__ import annotations
@@ -28,10 +27,12 @@ WHY = {1: "rejected by the gate", 2: "far off", 4: "it moves"}  # EVIDENCE's `wh
 
 
 def packed(shapes: Ellipsoids, packer: Packer) -> dict[str, Any]:
-    """Logarithms of the half axes, for they go from millimetres to kilometres, and x, y, z of a
-    turn whose w is not negative.
+    """Packs ellipsoids: logarithms of the half axes, and x, y, z of a quaternion whose w is
+    positive.
+
+    Logarithms, for the axes range from millimetres to kilometres.
     """
-    with np.errstate(divide="ignore"):  # -inf is told as not known
+    with np.errstate(divide="ignore"):  # -inf means unknown
         half = np.log10(shapes.half_m)
     return {
         "half": [packer.add(half[:, k]) for k in range(3)],
@@ -40,7 +41,7 @@ def packed(shapes: Ellipsoids, packer: Packer) -> dict[str, Any]:
 
 
 class Landmarks:
-    """What the filter left behind, and the history of each id that the log shows."""
+    """The landmarks that the filter left behind, and the history of each id in the log."""
 
     def __init__(
         self,
@@ -55,7 +56,7 @@ class Landmarks:
         self._packer = packer
 
     def json(self, left_out: list[str]) -> dict[str, Any]:
-        """All of it but the columns; `left_out` is told what is not in it."""
+        """Returns the data without the columns; adds to `left_out` what is missing."""
         made = {m.id: m for m in made_in(self._messages) if np.isfinite(m.p_W_m).all()}
         kept = sorted(made.values(), key=lambda m: -m.times_seen)[:LANDMARKS_MOST]
         if len(made) > len(kept):
@@ -78,7 +79,7 @@ class Landmarks:
         }
 
     def _nearest(self, p_W_m: Floats) -> Floats:
-        """(n, 3) the point of the way that is nearest to each."""
+        """Returns (n, 3) the nearest point of the path for each."""
         way = np.zeros((1, 3)) if self._way is None else self._way.poses.p
         way = way[np.isfinite(way).all(axis=1)]
         if not len(way) or not len(p_W_m):
@@ -86,7 +87,7 @@ class Landmarks:
         return np.asarray(way[cKDTree(way).query(p_W_m)[1]])
 
     def _sightings(self, ids: Any) -> tuple[Any, Any, Any]:
-        """First and last frame in which each was seen, ms, and in how many."""
+        """Returns first and last frame in which each was seen, ms, and in how many."""
         order = np.argsort(ids)
         first = np.full(len(ids), np.iinfo(np.int64).max)
         last, seen = np.zeros(len(ids), np.int64), np.zeros(len(ids), np.int64)

@@ -17,23 +17,23 @@ import numpy as np
 
 from pelorus.layout import Floats
 
-STEPS = 65534  # between least and largest; 0 is not known
+STEPS = 65534  # between least and largest; 0 is unknown
 
 
 @dataclass
 class Packer:
-    """Collects columns; what `add` returns tells the page where one is."""
+    """Collects columns; `add` returns where the page finds one."""
 
     _parts: list[bytes] = field(default_factory=list)
     _bytes: int = 0
 
     def add(self, values: Floats) -> dict[str, Any]:
-        """A column that is drawn."""
+        """Adds a column that is drawn."""
         values = np.asarray(values, np.float64)
         known = np.isfinite(values)
         low, high = (float(f(values[known])) if known.any() else 0.0 for f in (np.min, np.max))
         span = high - low
-        if not np.isfinite(span):  # beyond what a double has
+        if not np.isfinite(span):  # beyond the range of a double
             known &= np.abs(values) < 1e300
             return self.add(np.where(known, values, np.nan))
         scale = STEPS / span if span else 0.0
@@ -43,18 +43,18 @@ class Packer:
         return self._put(planes, len(values)) | {"low": low, "step": span / STEPS}
 
     def add_exactly(self, values: Any, kind: str) -> dict[str, Any]:
-        """A column of numbers that are looked up: `kind` is u1, u2, u4 or f4."""
+        """Adds a column of numbers that are looked up: `kind` is u1, u2, u4 or f4."""
         return self._put(np.asarray(values).astype(f"<{kind}").tobytes(), len(values)) | {
             "kind": kind
         }
 
     def _put(self, content: bytes, count: int) -> dict[str, Any]:
         at = self._bytes
-        pad = -len(content) % 4  # typed arrays begin at whole words
+        pad = -len(content) % 4  # typed arrays are aligned to 4 bytes
         self._parts.append(content + bytes(pad))
         self._bytes += len(content) + pad
         return {"at": at, "count": count}
 
     def text(self) -> str:
-        """All of it, packed, in letters that no markup has."""
+        """Returns all columns, packed, in letters that need no escape in markup."""
         return base64.b64encode(zlib.compress(b"".join(self._parts), 6)).decode("ascii")

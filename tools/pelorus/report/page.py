@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The page that answers: one HTML file that opens from anywhere, nothing fetched.
+"""Writes the result page: one HTML file that opens from anywhere and fetches nothing.
 
 What was found stands first, as text, and needs no script: verdict, settings to change, events.
-Below, one time cursor and one zoom run through health with its reasons, curves, way and map.
+Below, one time cursor and one zoom are shared by health with its reasons, curves, path and map.
 `report`, `check` and `explain` write it. Names and words of a recording are escaped here, and only
 ever set as text by the script; the JSON that it reads holds no `<`.
 
@@ -29,7 +29,7 @@ GRADES = ("good", "care", "bad")
 
 @dataclass(frozen=True)
 class Event:
-    """Times in seconds since the first frame; `lines` tell it, the first one most of it."""
+    """An event: times in seconds since the first frame; the first of `lines` says most of it."""
 
     from_s: float
     to_s: float
@@ -37,8 +37,8 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Table:
-    """Cells as text, the first row its head."""
+class PageTable:
+    """A table of text cells; the first row is its head."""
 
     title: str
     rows: Sequence[Sequence[str]]
@@ -57,26 +57,26 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Answer:
-    """What stands above the curves. `grade` is one of GRADES."""
+    """The text above the curves. `grade` is one of GRADES."""
 
     title: str
     grade: str
     verdict: str
     facts: str = ""
     lines: Sequence[str] = ()
-    changes: Sequence[str] = ()  # settings, as they stand in a config file
+    changes: Sequence[str] = ()  # settings, as in a config file
     events: Sequence[Event] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[PageTable] = ()
     pictures: Sequence[tuple[str, str, Path]] = ()  # title, caption, PNG
     moments: Sequence[tuple[float, str, bytes]] = ()  # s since the first frame, words, WebP
     about_moments: str = ""
     drawings: Sequence[Drawing] = ()
     commands: Sequence[str] = ()
-    lists: Sequence[tuple[str, Sequence[str]]] = ()  # to unfold: what stands before, and the rest
+    lists: Sequence[tuple[str, Sequence[str]]] = ()  # folded lists: head, and rows
 
 
 def write(path: Path, answer: Answer, curves: Curves | None = None) -> None:
-    """The whole page; without curves it is what stands above them."""
+    """Writes the whole page; without curves only the text above them."""
     parts = [
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
@@ -87,7 +87,7 @@ def write(path: Path, answer: Answer, curves: Curves | None = None) -> None:
         *_above(answer),
     ]
     if curves is not None:
-        content = curves.json()  # before what it has left out is told
+        content = curves.json()  # before what it left out is written
         body = _asset("body.html").replace("<!-- moments -->", _moments(answer))
         parts += [body, *_below(answer, curves), *_scripts(content, curves)]
     else:
@@ -134,7 +134,7 @@ def _event(event: Event) -> str:
     )
 
 
-def _table(table: Table) -> str:
+def _table(table: PageTable) -> str:
     head, *rows = table.rows
     cells = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     many = len(head) > COLUMNS_MOST  # then a phone shows a row as a list, with the names
@@ -182,7 +182,7 @@ def _drawings(answer: Answer) -> list[str]:
 
 
 def _moments(answer: Answer) -> str:
-    """A strip of pictures, each of which brings the cursor to its frame."""
+    """Returns a strip of pictures, each of which moves the cursor to its frame."""
     if not answer.moments:
         return ""
     out = [f'<h2>In the pictures</h2>\n<p class="soft">{escape(answer.about_moments)}</p>']

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The pictures of a report: the map and the whole map's covariance beside the course's filter, for
-the page, and two to show elsewhere. All that is a curve over time the page draws itself.
+"""The pictures of a report: two for the page and two to show elsewhere.
+
+Those for the page are the map and the whole map's covariance with the course's filter. The page
+itself draws all curves over time.
 """
 
 from __future__ import annotations
@@ -36,8 +38,8 @@ from pelorus.style import (
 CURVE_MIN = 2  # frames: one point is no curve
 
 
-class Picture(NamedTuple):
-    """A file `name`.png; without a caption it does not stand on the page."""
+class ReportPicture(NamedTuple):
+    """A file `name`.png; without a caption it is not on the page."""
 
     name: str
     title: str
@@ -45,19 +47,19 @@ class Picture(NamedTuple):
     draw: Callable[[], Figure]
 
 
-def pictures(compared: Comparison) -> list[Picture]:
-    """In the page's order; a curve needs two frames."""
-    seen = Picture("top-view", "", "", partial(top_view.draw, compared))
+def pictures(compared: Comparison) -> list[ReportPicture]:
+    """Returns the pictures in the page's order; a curve needs two frames."""
+    seen = ReportPicture("top-view", "", "", partial(top_view.draw, compared))
     out = [*_map(compared), seen]
     if len(compared.main.frames.t_ns) < CURVE_MIN:
         return out
     if compared.has_course:
         words = f"{COVARIANCE} {WHOLE_MAP.format(ids=compared.whole_map.ids)}"
         draw = partial(covariance, compared)
-        out.append(Picture("covariance", "Trace of the covariance", words, draw))
+        out.append(ReportPicture("covariance", "Trace of the covariance", words, draw))
     own = compared.accuracy.get(OWN)
     if own is not None and len(own.t_ns) >= CURVE_MIN and not compared.main.poses_given:
-        out.append(Picture("hero", "", "", partial(hero, compared)))
+        out.append(ReportPicture("hero", "", "", partial(hero, compared)))
     return out
 
 
@@ -73,7 +75,7 @@ WHOLE_MAP = (
 )
 
 
-def _map(compared: Comparison) -> list[Picture]:
+def _map(compared: Comparison) -> list[ReportPicture]:
     grid = compared.grid
     if grid is None:
         return []
@@ -83,18 +85,18 @@ def _map(compared: Comparison) -> list[Picture]:
         "it with other settings, and writes it for nav2's map_server."
     )
     title = f"{compared.subject.title}: {grid.plane.why}"
-    return [Picture("map", "Free and occupied", words, partial(picture.draw, grid, title))]
+    return [ReportPicture("map", "Free and occupied", words, partial(picture.draw, grid, title))]
 
 
 # --- errors and the band that the covariance promises ---------------------------------------------
 
 SIGMAS = 3.0
 HEADROOM = 1.1
-BAND_MAX = 6.0  # times the largest error: a band wider than that would flatten the error
+BAND_MAX = 6.0  # ratio to the largest error: a wider band would flatten the error
 
 
 def _error_in_band(axes: Axes, t: Floats, error: Floats, band: Floats, name: str) -> None:
-    """One error with its band."""
+    """Draws one error with its band."""
     pen = PENS[name]
     axes.fill_between(
         t,
@@ -110,7 +112,9 @@ def _error_in_band(axes: Axes, t: Floats, error: Floats, band: Floats, name: str
 
 
 def limits(error: Floats, band: Floats) -> tuple[float, float]:
-    """Symmetric; holds every error, and the band as far as it leaves the error legible."""
+    """Returns symmetric limits that hold every error, and the band as far as the error stays
+    legible.
+    """
     largest = float(np.nanmax(np.abs(error), initial=0.0))
     widest = float(np.nanmax(band[np.isfinite(band)], initial=0.0))
     half = max(largest, min(widest, BAND_MAX * largest) if largest else widest) * HEADROOM
@@ -124,8 +128,8 @@ POSITION = ("var_rho_x", "var_rho_y", "var_rho_z")
 
 
 def covariance(compared: Comparison) -> Figure:
-    """Trace of the state's covariance, of the whole map's (the course's figure 2), and of the
-    position block.
+    """Draws the traces of the state's covariance, the whole map's (the course's figure 2) and
+    the position's.
     """
     figure = new_figure(WIDTH_IN, 9.0)
     panels = figure.subplots(3, 1, sharex=True)
@@ -157,11 +161,11 @@ def _in_layers(compared: Comparison) -> list[Run]:
 
 
 def _positive(axes: Axes, t: Floats, values: Floats, run: Run) -> None:
-    """A logarithm shows no value of a broken covariance: the line has a gap there."""
+    """Draws a line with gaps where an invalid covariance has no logarithm."""
     axes.plot(t, np.where(values > 0, values, np.nan), **PENS[run.name].line)
 
 
-# --- one picture that says it all -----------------------------------------------------------------
+# --- one picture for the README -------------------------------------------------------------------
 
 HERO_IN = 12.0, 5.6
 BOTTOM_IN = 1.15  # the legend stands below
@@ -170,8 +174,8 @@ RIGHT_IN, RIGHT_WIDTH_IN, RIGHT_HEIGHT_IN, GAP_IN = 7.4, 4.4, 1.26, 0.16
 
 
 def hero(compared: Comparison) -> Figure:
-    """1200 px wide, readable at the width of a README: top view on the left, the position error
-    with its band on the right.
+    """Draws 1200 px for a README: top view on the left, position error with its band on the
+    right.
     """
     figure = Figure(figsize=HERO_IN, dpi=DPI)
     left = panel(figure, *LEFT_PANEL_IN)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where the points of a frame are seen, beside where the frames before it say that they should be.
+"""Reprojection residuals of a frame's points, with landmarks from the frames before.
 
 Each point is triangulated anew from the frames just before, at the poses that the filter had then,
-and projected at the frame's own pose. So a residual is that frame's alone: neither what the filter
-learnt later of the landmark nor a drift that both share is in it. At rest it is the pixels' noise.
+and projected at the frame's own pose. So a residual is that frame's alone: it depends neither on
+what the filter learnt later of the landmark nor on a common drift. At rest it is the pixel noise.
 """
 
 from __future__ import annotations
@@ -15,27 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import se3
-from pelorus.explain.log import Log
+from pelorus.explain.log import FilterLog
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
 
 BEFORE = 10  # frames
-SEEN_LEAST = 3  # times among them
-FAR_PX = 20.0  # a larger one is another point's
+SEEN_LEAST = 3  # views among them
+FAR_PX = 20.0  # a larger one is a wrong match
 NEAR_M = 1e-2
-REFINED = 3  # steps of Gauss and Newton
-FRAMES_MOST = 150  # that are looked at, evenly over the log
+REFINED = 3  # steps of Gauss-Newton
+FRAMES_MOST = 150  # evenly over the log
 
 
 class Residuals(NamedTuple):
-    """Of n observations: `pixels` (n, 4) as in STEREO, and `off` (n, 4), seen minus expected."""
+    """Residuals of n observations: `pixels` (n, 4) as in STEREO, and `off` (n, 4), seen minus
+    expected.
+    """
 
     pixels: Floats
     off: Floats
 
 
 class _View(NamedTuple):
-    """Points of a frame before, by their numbers in the frame that is looked at."""
+    """Points of an earlier frame, by their numbers in the examined frame."""
 
     point: NDArray[np.intp]
     pixels: Floats
@@ -45,8 +47,8 @@ class _View(NamedTuple):
 NOTHING = Residuals(np.empty((0, 4)), np.empty((0, 4)))
 
 
-def residuals_of(log: Log, k: int) -> Residuals:
-    """Of frame k."""
+def residuals_of(log: FilterLog, k: int) -> Residuals:
+    """Returns the residuals of frame k."""
     own = _camera_pose(log, k)
     frames = [j for j in range(max(k - BEFORE, 0), k) if log.poses[j] is not None]
     if own is None or len(frames) < SEEN_LEAST:
@@ -57,7 +59,7 @@ def residuals_of(log: Log, k: int) -> Residuals:
     for view in views:
         sums.add(view.point, _rows(log, view))
     p_W, told = sums.solved()
-    for _ in range(REFINED):  # the linear answer is too near: its rows hold the noise, too
+    for _ in range(REFINED):  # the linear solution is too near, for its rows contain the noise
         sums = _Sums(len(ids))
         for view in views:
             sums.add(view.point, _about(log, view, p_W[view.point]))
@@ -69,8 +71,8 @@ def residuals_of(log: Log, k: int) -> Residuals:
     return Residuals(seen[near], off[near])
 
 
-def residuals(log: Log) -> Residuals:
-    """Of frames evenly over the log."""
+def residuals(log: FilterLog) -> Residuals:
+    """Returns the residuals of frames evenly over the log."""
     count = len(log.frames)
     chosen = np.unique(np.linspace(0, count - 1, min(FRAMES_MOST, count)).round().astype(int))
     return _joined([residuals_of(log, int(k)) for k in chosen])
@@ -83,7 +85,7 @@ def _joined(parts: Sequence[Residuals]) -> Residuals:
 
 
 class _Sums:
-    """Normal equations of a point each: three unknowns."""
+    """Normal equations of many points, three unknowns each."""
 
     def __init__(self, count: int) -> None:
         self._N = np.zeros((count, 3, 3))
@@ -97,15 +99,15 @@ class _Sums:
         np.add.at(self._times, point, 1)
 
     def solved(self) -> tuple[Floats, NDArray[np.bool_]]:
-        """(n, 3), and of which it is known."""
+        """Returns (n, 3) points, and which are known."""
         told = (self._times >= SEEN_LEAST) & (np.linalg.det(self._N) > 0)
         N = np.where(told[:, None, None], self._N, np.eye(3))
         p = np.linalg.solve(N, self._b[:, :, None])[:, :, 0]
         return p.astype(np.float64), np.asarray(told)
 
 
-def _camera_pose(log: Log, k: int) -> Poses | None:
-    """World to left camera."""
+def _camera_pose(log: FilterLog, k: int) -> Poses | None:
+    """Returns world to left camera."""
     pose = log.poses[k]
     if pose is None:
         return None
@@ -114,7 +116,7 @@ def _camera_pose(log: Log, k: int) -> Poses | None:
     return se3.compose(T_CB, se3.inverse(T_WB))
 
 
-def _view(log: Log, j: int, ids: NDArray[np.int64]) -> _View:
+def _view(log: FilterLog, j: int, ids: NDArray[np.int64]) -> _View:
     T_CW = _camera_pose(log, j)
     assert T_CW is not None
     _, at, there = np.intersect1d(ids, log.frames[j].ids.astype(np.int64), return_indices=True)
@@ -123,23 +125,26 @@ def _view(log: Log, j: int, ids: NDArray[np.int64]) -> _View:
     return _View(at[good], pixels[good], T_CW)
 
 
-def _rows(log: Log, view: _View) -> tuple[Floats, Floats]:
-    """(n, 4, 3) and (n, 4): what uL, vL, uR and vR say of the point, linear, in pixels."""
+def _rows(log: FilterLog, view: _View) -> tuple[Floats, Floats]:
+    """Returns (n, 4, 3) and (n, 4): linear equations of the point by uL, vL, uR and vR, in
+    pixels.
+    """
     camera, pixels, T_CW = log.header.camera, view.pixels, view.T_CW
     z = camera.fx_px * camera.baseline_m / (pixels[:, 0] - pixels[:, 2])
     focal = np.array([camera.fx_px, camera.fy_px, camera.fx_px, camera.fy_px])
     ray = (pixels - [camera.cx_px, camera.cy_px, camera.cx_px, camera.cy_px]) / focal
-    first = np.array([0, 1, 0, 1])  # the axis that each is of
-    shift = np.array([0.0, 0.0, camera.baseline_m, 0.0])  # of the right camera, along x
+    first = np.array([0, 1, 0, 1])  # axis of each
+    shift = np.array([0.0, 0.0, camera.baseline_m, 0.0])  # shift of the right camera along x
     weight = focal / z[:, None]
     A: Floats = (T_CW.R[first] - ray[:, :, None] * T_CW.R[2]) * weight[:, :, None]
     y: Floats = (ray * T_CW.p[2] - T_CW.p[first] + shift) * weight
     return A, y
 
 
-def _about(log: Log, view: _View, p_W: Floats) -> tuple[Floats, Floats]:
-    """(n, 4, 3) and (n, 4): derivatives of the pixels by the point, and seen minus expected; zero
-    where it lies behind the camera.
+def _about(log: FilterLog, view: _View, p_W: Floats) -> tuple[Floats, Floats]:
+    """Returns (n, 4, 3) the pixels' derivatives by the point, and (n, 4) seen minus expected.
+
+    Zero where the point is behind the camera.
     """
     camera = log.header.camera
     x, y, z = se3.apply(view.T_CW, p_W).T
@@ -158,7 +163,7 @@ def _about(log: Log, view: _View, p_W: Floats) -> tuple[Floats, Floats]:
     return J * keep[:, None, None], np.where(keep[:, None], off, 0.0)
 
 
-def _projected(log: Log, p_W: Floats, T_CW: Poses) -> Floats:
+def _projected(log: FilterLog, p_W: Floats, T_CW: Poses) -> Floats:
     camera = log.header.camera
     x, y, z = se3.apply(T_CW, p_W).T
     z = np.where(z > NEAR_M, z, np.nan)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a report is made of: the recording itself, and what each run of a filter left behind."""
+"""What a report compares: the recording, and the result of each run of a filter."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ from pelorus.trajectory import Trajectory, estimate_in, truth_in
 
 @dataclass(frozen=True)
 class Subject:
-    """`truth` holds the poses at STEREO times; `known` landmarks lie in the truth's world."""
+    """The recording: `truth` has the poses at STEREO times; `known` landmarks are in the truth's
+    world.
+    """
 
     path: Path
     header: Header
@@ -33,7 +35,7 @@ class Subject:
 
     @property
     def known_W_m(self) -> Floats:
-        """(n, 3)."""
+        """Returns the known landmarks (n, 3)."""
         return np.array([landmark.p_W_m for landmark in self.known]).reshape(-1, 3)
 
     @property
@@ -42,14 +44,14 @@ class Subject:
 
 
 def read_subject(path: Path) -> Subject:
-    """Read a recording; PelorusError where there is nothing to report on."""
+    """Reads a recording; raises PelorusError where there is nothing to report on."""
     messages = wire.messages_of(path)
     header = next(m for m in messages if isinstance(m, Header))
     return Subject(path, header, truth_in(messages), known_in(messages))
 
 
 def require_twists(subject: Subject, also: Sequence[str]) -> None:
-    """The filters that stand beside the user's own take twists alone."""
+    """Refuses an IMU's recording, for the filters to compare with take twists alone."""
     if also and subject.header.process is Process.IMU:
         asked = " ".join(f"--also {name}" for name in also)
         raise PelorusError(
@@ -65,7 +67,7 @@ WORLD_DEPTH_M = 60.0  # the world model must leave far points out
 
 @dataclass(frozen=True)
 class Plan:
-    """One run: the name is also that of its files."""
+    """A planned run; its name is also that of its files."""
 
     name: str
     program: Path
@@ -75,9 +77,9 @@ class Plan:
 def plan_runs(
     programs: Programs, recording: Path, settings: Sequence[str], also: Sequence[str] = ()
 ) -> list[Plan]:
-    """The user's own run, dead reckoning, and of `course` and `world` what is asked for.
+    """Returns the user's own run, dead reckoning, and `course` and `world` if asked for.
 
-    `settings` hold for all but `course`, whose preset is the whole point of it.
+    `settings` hold for all but `course`, which has a fixed preset.
     """
     plans = [
         Plan(OWN, programs.float32, tuple(settings)),
@@ -94,7 +96,9 @@ def plan_runs(
 
 
 class Points(NamedTuple):
-    """Landmarks in the world: positions (n, 3), and the root of an axis' mean variance (n,), m."""
+    """Landmarks in the world: positions (n, 3), and sigma (n,), m, the root of an axis' mean
+    variance.
+    """
 
     p_W_m: Floats
     sigma_m: Floats
@@ -102,8 +106,10 @@ class Points(NamedTuple):
 
 @dataclass(frozen=True)
 class Run:
-    """One replay: `trajectory` and the pose covariance (n, 6, 6) after each frame; `summary` is the
-    program's, with the figures of `pelorus.evaluation`.
+    """A finished run.
+
+    `trajectory` and the pose covariance (n, 6, 6) are after each frame; `summary` is the program's,
+    with the figures of `pelorus.evaluation`.
     """
 
     plan: Plan
@@ -122,7 +128,7 @@ class Run:
 
     @property
     def health(self) -> TimeLine:
-        """From when to when it was not good, and why."""
+        """Returns when health was not good, and why."""
         return self._health or TimeLine(0, {}, ())
 
     @cached_property
@@ -131,12 +137,12 @@ class Run:
 
     @property
     def poses_given(self) -> bool:
-        """Mode mapping: they are the truth's, and have no error of their own."""
+        """Returns whether the mode is mapping: the poses are then the truth's, without error."""
         return bool(self.summary["mode"] == "mapping")
 
 
 def carry_out(plan: Plan, subject: Subject, folder: Path) -> Run:
-    """Replay the recording as planned, leave the files in the folder, and read them."""
+    """Replays the recording as planned, leaves the files in the folder, and reads them."""
     outputs = Outputs.named(folder, plan.name)
     summary, said = replay(plan.program, subject.path, plan.options, outputs)
     messages = wire.messages_of(outputs.log)
@@ -156,6 +162,6 @@ def carry_out(plan: Plan, subject: Subject, folder: Path) -> Run:
 
 
 def read_map(messages: Sequence[Message]) -> Points:
-    """The landmarks that a filter left behind, evicted and final."""
+    """Returns the landmarks that a filter left behind, evicted and final."""
     made = made_in(messages)
     return Points(np.array([m.p_W_m for m in made]).reshape(-1, 3), sigmas_m(made))

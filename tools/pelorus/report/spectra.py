@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Drawings of a log beside its curves: how the IMU vibrates, and what is left of the pixels."""
+"""Draws the spectrum of the IMU's vibration, and the pixel residuals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.signal import welch
 
-from pelorus.explain.log import Log
+from pelorus.explain.log import FilterLog
 from pelorus.layout import Floats
 from pelorus.report.drawings import arrows, plot
 from pelorus.report.page import Drawing
@@ -22,8 +22,8 @@ BINS = 61
 ROBUST = 1.4826
 
 
-def drawings(log: Log) -> Iterator[Drawing]:
-    """All that this log has."""
+def drawings(log: FilterLog) -> Iterator[Drawing]:
+    """Yields all drawings for which this log has data."""
     if log.by_imu:
         yield from _spectra(log)
     found = residuals(log)
@@ -32,7 +32,7 @@ def drawings(log: Log) -> Iterator[Drawing]:
         yield from _over_picture(log, found)
 
 
-def _spectra(log: Log) -> Iterator[Drawing]:
+def _spectra(log: FilterLog) -> Iterator[Drawing]:
     order = np.argsort(log.reading_ns, kind="stable")
     t_ns = log.reading_ns[order]
     if len(t_ns) < LEAST:
@@ -78,7 +78,7 @@ def _histogram(found: Residuals) -> Drawing:
     return Drawing("Residuals", about, drawn)
 
 
-def _over_picture(log: Log, found: Residuals) -> Iterator[Drawing]:
+def _over_picture(log: FilterLog, found: Residuals) -> Iterator[Drawing]:
     width, height = float(log.header.image_width_px), float(log.header.image_height_px)
     if not (width and height):
         most = np.nanmax(found.pixels, axis=0)

@@ -19,13 +19,13 @@ from pelorus.report.results import OWN
 from pelorus.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 
 MARGIN = 0.15  # of the larger side
-STRAY = 0.75  # a run may widen the picture by so much of the larger side, then it leaves it
-SIGMA_MAX = 0.05  # of the larger side: a landmark less certain than that is no point in the picture
+STRAY = 0.75  # share of the larger side by which another run may widen the picture
+SIGMA_MAX = 0.05  # of the larger side: a less certain landmark is not drawn
 EXTENT_MIN_M = 1e-3  # a recording at rest needs axes too
 LEFT_IN, BOTTOM_IN, TOP_IN = 0.9, 0.7, 0.4  # room for labels and title
 PANEL_IN = 6.7  # the legend stands to the right of it
 PANEL_HEIGHT_IN = (3.5, 8.0)
-FEW = 200  # so many landmarks and fewer get larger dots
+FEW = 200  # up to so many landmarks get larger dots
 
 
 class Box(NamedTuple):
@@ -42,7 +42,7 @@ class Box(NamedTuple):
         return Box(self.low - by, self.high + by)
 
     def shaped(self, width_to_height: float) -> Box:
-        """Widened in one direction, so that a panel of that shape shows it without distortion."""
+        """Returns the box widened in one direction to a panel's shape, without distortion."""
         width, height = self.high - self.low
         half = np.array(
             [max(width, height * width_to_height), max(height, width / width_to_height)]
@@ -51,7 +51,7 @@ class Box(NamedTuple):
         return Box(middle - half / 2, middle + half / 2)
 
 
-class View(NamedTuple):
+class TopView(NamedTuple):
     """The plane, and everything in its coordinates (n, 2)."""
 
     plane: Plane
@@ -63,8 +63,8 @@ class View(NamedTuple):
     box: Box
 
 
-def view(compared: Comparison) -> View:
-    """Choose the plane and the picture's limits."""
+def view(compared: Comparison) -> TopView:
+    """Chooses the plane and the picture's limits."""
     main = compared.accuracy.get(OWN)
     looked_at = plane.choose(compared.subject.header.body_axes, compared.main.trajectory.poses)
     paths = {run.name: looked_at.flat(run.trajectory.poses.p) for run in compared.runs}
@@ -73,21 +73,23 @@ def view(compared: Comparison) -> View:
     points = compared.main.landmarks
     shown = points.sigma_m <= SIGMA_MAX * box.side
     known = compared.subject.known_W_m
-    if main:  # they lie in the truth's world, and the picture is in the estimate's
+    if main:  # known landmarks are in the truth's world, the picture in the estimate's
         known = se3.apply(main.A, known)
     landmarks = looked_at.flat(points.p_W_m[shown])
-    return View(looked_at, paths, truth, looked_at.flat(known), landmarks, int((~shown).sum()), box)
+    return TopView(
+        looked_at, paths, truth, looked_at.flat(known), landmarks, int((~shown).sum()), box
+    )
 
 
 def _limits(paths: dict[str, Floats], truth: Floats | None) -> Box:
-    """Around the main run and the truth; the other runs widen it, but cannot blow it up."""
+    """Returns limits around the main run and the truth; the other runs widen them to a limit."""
     core = paths[OWN] if truth is None else np.concatenate((paths[OWN], truth))
     whole = around(core, tuple(paths.values()), STRAY)
     return whole.grown(MARGIN * whole.side)
 
 
 def around(core: Floats, others: Sequence[Floats], stray: float) -> Box:
-    """All of the core; others widen the box by so much of its side at most."""
+    """Returns a box around the core; others widen it by a share of its side at most."""
     inner = Box(core.min(axis=0), core.max(axis=0))
     outmost = inner.grown(stray * inner.side)
     everything = np.concatenate((core, *others))
@@ -96,7 +98,7 @@ def around(core: Floats, others: Sequence[Floats], stray: float) -> Box:
 
 
 def draw(compared: Comparison) -> Figure:
-    """The picture, its plane in the title, its legend beside the data."""
+    """Draws the picture, its plane in the title, its legend beside the data."""
     seen = view(compared)
     width, height = seen.box.high - seen.box.low
     panel_height_in = float(np.clip(PANEL_IN * height / width, *PANEL_HEIGHT_IN))
@@ -108,8 +110,8 @@ def draw(compared: Comparison) -> Figure:
     return figure
 
 
-def fill(axes: Axes, seen: View, width_to_height: float) -> None:
-    """Draw into a panel of the given shape."""
+def fill(axes: Axes, seen: TopView, width_to_height: float) -> None:
+    """Draws into a panel of the given shape."""
     dots: dict[str, Any] = {"color": GREEN, "marker": ".", "linestyle": "none"}
     size = 3 if len(seen.landmarks) > FEW else 7
     axes.plot(*seen.landmarks.T, markersize=size, alpha=0.6, markeredgewidth=0, **dots)
@@ -137,7 +139,7 @@ def fill(axes: Axes, seen: View, width_to_height: float) -> None:
     axes.set_ylabel(seen.plane.up.label)
 
 
-def _mark_ends(axes: Axes, seen: View) -> None:
+def _mark_ends(axes: Axes, seen: TopView) -> None:
     path = seen.paths[OWN]
     style: dict[str, Any] = {
         "color": PURPLE,

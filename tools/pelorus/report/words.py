@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report in words, the same on the terminal and on the page: the runs, and what is off."""
+"""The report in words, for terminal and page: the runs, and what is wrong with them."""
 
 from __future__ import annotations
 
@@ -23,12 +23,14 @@ POSE_KEYS = ("err0_m", "ate_m", "rot_deg", "nees_per_dof")
 
 
 def titles(compared: Comparison) -> tuple[str, ...]:
-    """The map's columns stand only where the recording knows its landmarks."""
+    """Returns the titles; the map's columns only where the recording has known landmarks."""
     return ("run", *POSE, *(MAP if compared.subject.known else ()), *USE)
 
 
 def row(compared: Comparison, run: Run) -> tuple[str, ...]:
-    """Cells in the order of the titles. In mapping the poses are given: they have no error."""
+    """Returns the cells in the order of the titles. In mapping the poses are given, without
+    error.
+    """
     summary = run.summary
     keys = (*POSE_KEYS, *(MAP_KEYS if compared.subject.known else ()))
     use = (str(summary["used"]), str(summary["gated"]), _factor(summary["realtime_factor"]))
@@ -36,7 +38,7 @@ def row(compared: Comparison, run: Run) -> tuple[str, ...]:
 
 
 def number(value: Any) -> str:
-    """Three digits, and no more than a millimetre."""
+    """Returns three digits, and no more than millimetres."""
     if value is None:
         return NONE
     if abs(value) >= 1e5:
@@ -57,7 +59,7 @@ GATE_LOCKED, GATE_INERT, NIS_HIGH, NOT_POSITIVE = (
     for name in ("GATE_LOCKED", "GATE_INERT", "NIS_HIGH", "NOT_POSITIVE")
 )
 NEES_HIGH = 2.0
-FRAMES_ENOUGH = 20  # below, a mean NEES says nothing
+FRAMES_ENOUGH = 20  # with fewer, a mean NEES means nothing
 GATED_MANY = 0.2  # of the matched observations
 LOST_MANY = 0.02  # of the frames
 INERT_MANY = 0.05  # of the frames
@@ -66,9 +68,7 @@ NIS_HIGH_MANY = 0.2  # of the frames
 
 
 def remarks(compared: Comparison) -> list[str]:
-    """A line for each thing that is off with a run, beside the verdict; nobody asked for advice on
-    dead reckoning.
-    """
+    """Returns a line for each fault of a run, beyond the verdict; none for dead reckoning."""
     dead_reckoning = compared.run("dead-reckoning")
     lines = [
         line
@@ -98,7 +98,7 @@ def _suggests_bias(header: Header) -> bool:
 
 
 def _of_run(run: Run, dead_reckoning: Run, compared: Comparison) -> Iterator[str]:
-    """Of the user's own run without what its verdict says."""
+    """Yields the remarks on a run; for the user's own without what its verdict says."""
     checks = [_frames(run), *([_map(run)] if run.poses_given else []), _gate(run), _room(run)]
     if run is not compared.main:
         checks += [_health(run, compared.origin_ns), _consistency(run), _noise(run)]
@@ -145,7 +145,7 @@ def _consistency(run: Run) -> Iterator[str]:
 
 
 def _map(run: Run) -> Iterator[str]:
-    """Where the poses are given, the map is what was estimated."""
+    """Yields remarks on the map, which is what was estimated where the poses are given."""
     found = run.summary
     if not found["map_landmarks"]:
         yield "its poses were given, and the recording knows no landmarks: nothing to compare."
@@ -195,7 +195,7 @@ def _room(run: Run) -> Iterator[str]:
 
 
 def _use(run: Run, dead_reckoning: Run) -> Iterator[str]:
-    """A filter that does no better than the twists alone is of no use."""
+    """Yields a remark if a filter does no better than the twists alone."""
     ate, without = run.summary["ate_m"], dead_reckoning.summary["ate_m"]
     if run is dead_reckoning or run.summary["truth_frames"] < FRAMES_ENOUGH:
         return

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A stereo camera on a body as somebody else's calibration describes it, and its rectification."""
+"""A stereo camera on a body, by any program's calibration, and its rectification."""

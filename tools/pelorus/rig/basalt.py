@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Basalt's calibration: JSON with everything in value0.
+"""Reads Basalt's calibration: JSON with everything in value0.
 
-T_imu_cam brings points of the camera to the IMU; the IMU's clock is the pictures' plus the offset;
-a right reading is (I + S) of the measured one less the bias.
+T_imu_cam maps points of the camera to the IMU; the IMU's clock is the pictures' plus the offset; a
+corrected reading is (I + S) of the measured one minus the bias.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 
-# Names of the parameters behind fx, fy, cx, cy.
+# Names of the parameters after fx, fy, cx, cy.
 LENSES: dict[str, tuple[LensModel, tuple[str, ...]]] = {
     "pinhole": (LensModel.NONE, ()),
     "pinhole-radtan8": (LensModel.RADTAN, ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")),
     "kb4": (LensModel.EQUIDISTANT, ("k1", "k2", "k3", "k4")),
     "ds": (LensModel.DS, ("xi", "alpha")),
     "eucm": (LensModel.EUCM, ("alpha", "beta")),
-    "ucm": (LensModel.EUCM, ("alpha",)),  # with a beta of 1
+    "ucm": (LensModel.EUCM, ("alpha",)),  # with beta 1
 }
 NOISE = {
     "gyro_noise": "gyro_noise_std",
@@ -41,13 +41,13 @@ NOISE = {
 
 
 def is_calibration(content: Named) -> bool:
-    """By its value0."""
+    """Returns whether it has Basalt's value0."""
     inner = content.content.get("value0")
     return isinstance(inner, dict) and "T_imu_cam" in inner
 
 
 def read(content: Named, asked: Sequence[str] = ()) -> Rig:
-    """Of two cameras: those asked for by number, else the two that are a pair."""
+    """Reads two cameras: those asked for by number, else the stereo pair."""
     whole = content.object("value0")
     poses = [_pose(one) for one in _each(whole, "T_imu_cam")]
     cameras = _each(whole, "intrinsics")
@@ -56,13 +56,13 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
         raise ForeignFileError(
             content.path,
             f"has {len(cameras)} cameras and {len(poses)} of T_imu_cam",
-            due="two of each are expected",
+            expected="two of each are expected",
         )
     lenses = [
         _lens(camera, sizes[k] if k < len(sizes) else [0, 0]) for k, camera in enumerate(cameras)
     ]
     known = [
-        several.Camera((f"cam{k}",), lens, se3.inverse(T))
+        several.RigCamera((f"cam{k}",), lens, se3.inverse(T))
         for k, (lens, T) in enumerate(zip(lenses, poses, strict=True))
     ]
     rig = several.rig(content.path, known, asked)
@@ -105,14 +105,14 @@ def _imu(whole: Named) -> ImuModel:
         w = whole.array("calib_gyro_bias", 12)
     lower = np.zeros((3, 3))
     lower[[0, 1, 2, 1, 2, 2], [0, 0, 0, 1, 1, 2]] = a[3:]
-    square = w[3:].reshape(3, 3).T  # column after column
+    square = w[3:].reshape(3, 3).T  # column-major
     found = Correction(np.eye(3) + lower, -a[:3], np.eye(3) + square, w_0=-w[:3])
     remark = f"{whole.path}: calib_accel_bias and calib_gyro_bias are applied to the readings"
     return ImuModel(Noise(**told), found, () if found.is_none else (remark,))
 
 
 def _one(whole: Named, name: str) -> float:
-    """One number, or the root mean square of three."""
+    """Returns one number, or the root mean square of three."""
     value: Floats = np.atleast_1d(
         whole.array(name, 3) if isinstance(whole.get(name), list) else whole.array(name)
     )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """ROS's camera_info of two cameras, as messages or as the YAML files of camera_calibration.
 
-K and D are of the pictures as they were taken; R turns a camera into the rectified one, P projects
-there, and the fourth number of the right one's P is -fx times the baseline.
+K and D are of the raw pictures; R turns a camera into the rectified one, P projects there, and the
+fourth number of the right one's P is -fx times the baseline.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ LENSES = {
 
 
 class Info(NamedTuple):
-    """One camera's; `path` and `at` say where it stands."""
+    """One camera's calibration; `path` and `at` say where it is written."""
 
     path: Path
     at: str
@@ -45,14 +45,14 @@ class Info(NamedTuple):
     height_px: int
 
     def lens(self, rectified: bool) -> Lens:
-        """Of the pictures as they were taken, or of those that somebody rectified."""
+        """Returns the lens of the raw pictures, or of rectified ones."""
         K, P, D = self.K, self.P, self.D
         if P[0, 0] <= 0 or K[0, 0] <= 0:
             raise ForeignFileError(
                 self.path,
                 "the camera is not calibrated: K or P is 0",
                 at=self.at,
-                due="--calibration is expected",
+                expected="--calibration is expected",
             )
         size = self.width_px, self.height_px
         if rectified:
@@ -63,7 +63,7 @@ class Info(NamedTuple):
                 self.path,
                 f"distortion model {self.model!r} with {len(D)} numbers",
                 at=self.at,
-                due=f"{' or '.join(filter(None, LENSES))} is expected",
+                expected=f"{' or '.join(filter(None, LENSES))} is expected",
             )
         coefficients = tuple(D.tolist()) if D.any() else ()
         return Lens(model, (K[0, 0], K[1, 1], K[0, 2], K[1, 2]), coefficients, *size)
@@ -71,7 +71,7 @@ class Info(NamedTuple):
 
 @dataclass(frozen=True)
 class Infos:
-    """Of the left and the right camera; `rectified` where somebody rectified the pictures."""
+    """Both cameras' calibrations; `rectified` if the pictures are rectified already."""
 
     left: Info
     right: Info
@@ -82,7 +82,7 @@ class Infos:
         return bool(self.left.P[0, 3] != self.right.P[0, 3])
 
     def rig(self, T_RL: Poses | None = None) -> Rig:
-        """`T_RL` is of the cameras themselves, where P has no baseline."""
+        """Returns the rig; `T_RL` is of the raw cameras, where P has no baseline."""
         left, right = self.left, self.right
         lenses = left.lens(self.rectified), right.lens(self.rectified)
         R_left, R_right = (
@@ -104,12 +104,12 @@ class Infos:
 
 
 def is_camera_info(content: Named) -> bool:
-    """A file of camera_calibration."""
+    """Returns whether it is a file of camera_calibration."""
     return "camera_matrix" in content and "projection_matrix" in content
 
 
 def read(content: Named) -> Info:
-    """Of one file."""
+    """Reads one file."""
     D = _row(content, "distortion_coefficients")
     model = content.content.get("distortion_model", "plumb_bob")
     width, height = (content.content.get(name, 0) for name in ("image_width", "image_height"))
@@ -127,13 +127,14 @@ def read(content: Named) -> Info:
 
 
 def pair(first: Named, second: Named, lens: LensModel | None) -> Rig:
-    """Of two files in any order; `lens` none says that the pictures are rectified already."""
+    """Reads two files in any order; `lens` none means that the pictures are rectified already."""
     infos = Infos(read(first), read(second), lens is LensModel.NONE)
     if not infos.have_baseline:
         raise ForeignFileError(
             second.path,
             "the projection_matrix of neither camera has a baseline",
-            due="files of a stereo calibration are expected: P[3] of the right one is -fx baseline",
+            expected="files of a stereo calibration are expected: P[3] of the right one is -fx "
+            "baseline",
         )
     return infos.rig()
 

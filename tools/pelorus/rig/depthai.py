@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The calibration of an OAK camera, as DepthAI writes it (eepromToJsonFile): lengths in cm.
+"""Reads an OAK camera's calibration, as DepthAI writes it (eepromToJsonFile): lengths in cm.
 
-cameraData lists sockets, each with a camera. Its extrinsics bring its points to the camera of the
-socket that they name, q_to = R q + t, and so does imuExtrinsics with points of the IMU; a socket of
+cameraData lists sockets, each with a camera. Its extrinsics map its points to the camera of the
+socket that they name, q_to = R q + t, and so do imuExtrinsics with points of the IMU; a socket of
 -1 is none. stereoRectificationData names the sockets of the stereo pair.
 """
 
@@ -33,23 +33,23 @@ STEREO, SIDES = "stereoRectificationData", ("leftCameraSocket", "rightCameraSock
 
 
 def is_calibration(content: Named) -> bool:
-    """By its list of cameras."""
+    """Returns whether it has DepthAI's list of cameras."""
     return isinstance(content.content.get("cameraData"), list)
 
 
 def read(content: Named, asked: Sequence[str] = ()) -> Rig:
-    """Of two cameras: those asked for by socket, else the stereo pair that the file names."""
+    """Reads two cameras: those asked for by socket, else the stereo pair that the file names."""
     by_socket = _sockets(content)
     placed = _placed(by_socket)
     cameras = [
-        several.Camera((f"CAM_{chr(ord('A') + k)}", str(k)), _lens(by_socket[k]), T)
+        several.RigCamera((f"CAM_{chr(ord('A') + k)}", str(k)), _lens(by_socket[k]), T)
         for k, T in placed.items()
     ]
     if len(cameras) < 2:
         raise ForeignFileError(
             content.path,
             f"has {len(cameras)} camera whose place is told by another one's",
-            due="two that extrinsics join are expected",
+            expected="two that extrinsics join are expected",
         )
     stereo = [] if asked else _stereo(content, set(placed))
     rig = several.rig(content.path, cameras, asked or [str(k) for k in stereo])
@@ -64,7 +64,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
 
 
 def _socket(value: Any) -> int:
-    """Its number; newer files may have its name."""
+    """Returns a socket's number; newer files may have its name."""
     return SOCKETS.get(value, NO_SOCKET) if isinstance(value, str) else int(value)
 
 
@@ -79,7 +79,7 @@ def _sockets(content: Named) -> dict[int, Named]:
 
 
 def _placed(by_socket: dict[int, Named]) -> dict[int, Poses]:
-    """To each camera from the one frame that the most of them are joined to."""
+    """Returns maps to each camera from the frame that joins most of them."""
     steps = {}
     for k, camera in by_socket.items():
         extrinsics = camera.object("extrinsics")
@@ -110,7 +110,7 @@ def _stereo(content: Named, there: set[int]) -> list[int]:
 
 
 def _imu(content: Named, placed: dict[int, Poses]) -> Poses | None:
-    """From the IMU to the frame of `placed`; None where the file does not know: R is zero."""
+    """Returns the map from the IMU to the frame of `placed`; None if it is unknown (R is zero)."""
     if "imuExtrinsics" not in content:
         return None
     extrinsics = content.object("imuExtrinsics")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a calibration says of an IMU: its noise, and how its readings become those of a right one.
+"""An IMU's noise and the correction of its readings, by a calibration.
 
     a = A a_m + a_0,    w = W w_m + G a + w_0
 
@@ -19,7 +19,7 @@ from pelorus.layout import Floats
 
 @dataclass(frozen=True)
 class Correction:
-    """The matrices and offsets of both."""
+    """The matrices and offsets of accelerometer and gyro."""
 
     A: Floats = field(default_factory=lambda: np.eye(3))
     a_0: Floats = field(default_factory=lambda: np.zeros(3))
@@ -40,7 +40,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class ImuModel:
-    """`remarks` say what of the file is applied, and what is not."""
+    """Noise and correction; `remarks` say which parts of the file are applied."""
 
     noise: Noise = field(default_factory=Noise)
     correction: Correction = field(default_factory=Correction)

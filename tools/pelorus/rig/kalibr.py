@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Kalibr's camchain and IMU files, and the sensor.yaml of an EuRoC folder, which are much alike.
+"""Reads Kalibr's camchain and IMU files, and the similar sensor.yaml of an EuRoC folder.
 
-Which way a transform goes is in its name, and nothing else is believed:
+The direction of a transform is in its name, and nothing else is assumed:
 
 T_cam_imu    brings points of the IMU to the camera
 T_imu_cam    the other way round (OpenVINS writes its Kalibr files so)
@@ -40,8 +40,8 @@ TO_CAMERA, FROM_CAMERA = ("T_cam_imu",), ("T_imu_cam", "T_BS")
 STEP = "T_cn_cnm1"
 CAMERA = re.compile(r"cam\d+")
 MODELS = ("pinhole", *spheres.PARAMETERS)
-FOCAL_MIN_PX = 1.0  # less is in another unit
-AGREE = 1e-3  # m and rad: two ways to the same camera
+FOCAL_MIN_PX = 1.0  # a smaller one is in another unit
+AGREE = 1e-3  # m and rad: tolerance of two chains to the same camera
 NOISE = {
     "gyro_noise": "gyroscope_noise_density",
     "accel_noise": "accelerometer_noise_density",
@@ -51,32 +51,32 @@ NOISE = {
 
 
 def is_camchain(content: Named) -> bool:
-    """Cameras one after the other, as Kalibr writes them."""
+    """Returns whether it has numbered cameras, as Kalibr writes them."""
     return "cam0" in content
 
 
 def is_sensor(content: Named) -> bool:
-    """The sensor.yaml of one camera."""
+    """Returns whether it is the sensor.yaml of one camera."""
     return "intrinsics" in content and "camera_model" in content
 
 
 def is_imu(content: Named) -> bool:
-    """An IMU's noise."""
+    """Returns whether it is an IMU's noise."""
     return "imu0" in content or any(name in content for name in NOISE.values())
 
 
 def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
-    """Of two cameras: those asked for by name or topic, else the two that are a pair."""
+    """Reads two cameras: those asked for by name or topic, else the stereo pair."""
     if "cam1" not in content:
         raise ForeignFileError(
-            content.path, "has one camera, cam0", due="cam0 and cam1 are expected"
+            content.path, "has one camera, cam0", expected="cam0 and cam1 are expected"
         )
     names = [name for name in content.content if CAMERA.fullmatch(str(name))]
     cameras = [content.object(name) for name in sorted(names, key=lambda name: int(name[3:]))]
     if len(cameras) == 2 and not asked:
         return pair(cameras[0], cameras[1])
     known = [
-        several.Camera((camera.at, str(camera.content.get("rostopic", ""))), _lens(camera), T)
+        several.RigCamera((camera.at, str(camera.content.get("rostopic", ""))), _lens(camera), T)
         for camera, T in zip(cameras, _chained(cameras), strict=True)
     ]
     chosen = several.pair(content.path, known, asked)
@@ -86,7 +86,7 @@ def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
 
 
 def _chained(cameras: Sequence[Named]) -> list[Poses]:
-    """To each camera from a frame that all share: the first one, or the IMU where all name it."""
+    """Returns maps to each camera from the first one, or from the IMU if all name it."""
     on_body = [_on_body(camera) for camera in cameras]
     known = [T for T in on_body if T is not None]
     if len(known) == len(cameras):
@@ -95,21 +95,25 @@ def _chained(cameras: Sequence[Named]) -> list[Poses]:
     for camera in cameras[1:]:
         if STEP not in camera:
             raise ForeignFileError(
-                camera.path, "does not say where it stands", at=camera.at, due=f"{STEP} is expected"
+                camera.path,
+                "does not say where it stands",
+                at=camera.at,
+                expected=f"{STEP} is expected",
             )
         found.append(se3.compose(pose(camera, STEP), found[-1]))
     return found
 
 
 def topics(content: Named) -> set[str]:
-    """Of its cameras."""
+    """Returns the topics of its cameras."""
     cameras = [one for one in content.content.values() if isinstance(one, dict)]
     return {str(one["rostopic"]) for one in cameras if "rostopic" in one}
 
 
 def pair(first: Named, second: Named, step: Poses | None = None) -> Rig:
-    """Two cameras of one file, or of one each; `step` brings points of the first to the second,
-    else the file says it.
+    """Reads two cameras of one file, or of one each.
+
+    `step` maps points of the first to the second; by default the file has it.
     """
     T_1B, T_2B = _on_body(first), _on_body(second)
     steps = pose(second, STEP) if step is None and STEP in second else step
@@ -118,7 +122,7 @@ def pair(first: Named, second: Named, step: Poses | None = None) -> Rig:
             raise ForeignFileError(
                 second.path,
                 f"{second.at or 'the second camera'} does not say where it stands",
-                due=f"{STEP} is expected, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of "
+                expected=f"{STEP} is expected, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of "
                 "both cameras",
             )
         steps = se3.compose(T_2B, se3.inverse(T_1B))
@@ -135,10 +139,10 @@ def pair(first: Named, second: Named, step: Poses | None = None) -> Rig:
 
 
 def with_imu(rig: Rig, content: Named) -> Rig:
-    """The rig on the IMU of the file: its noise, its errors, its clock, its place.
+    """Returns the rig on the IMU of the file: its noise, its errors, its clock, its place.
 
     Kalibr's models: a_m = M a, w_m = M C w + A C a. Times of IMU i are time_offset before those of
-    imu0, on whose clock and body the camchain is; T_i_b brings points of imu0 to it.
+    imu0, on whose clock and body the camchain is; T_i_b maps points of imu0 to it.
     """
     own = content.object("imu0") if "imu0" in content else content
     model, remarks = imu(content), []
@@ -155,7 +159,7 @@ def with_imu(rig: Rig, content: Named) -> Rig:
 
 
 def imu(content: Named) -> ImuModel:
-    """The IMU by itself."""
+    """Returns the IMU by itself."""
     own = content.object("imu0") if "imu0" in content else content
     told = {name: own.number(key) for name, key in NOISE.items() if key in own}
     for name, value in told.items():
@@ -166,7 +170,7 @@ def imu(content: Named) -> ImuModel:
 
 
 def _correction(own: Named) -> tuple[Correction, list[str]]:
-    """What undoes the errors that the model knows; and what is said of it."""
+    """Returns the inverse of the errors that the model knows, and remarks."""
     A, W, G = np.eye(3), np.eye(3), np.zeros((3, 3))
     remarks = []
     if "accelerometers" in own:
@@ -201,7 +205,7 @@ def _inverse(content: Named, name: str) -> Floats:
 
 
 def pose(content: Named, name: str) -> Poses:
-    """A transform of 4 x 4 or 3 x 4 numbers."""
+    """Reads a transform of 4 x 4 or 3 x 4 numbers."""
     value = content.get(name)
     rows = value.get("rows") if isinstance(value, dict) else np.size(np.array(value, object)) // 4
     if rows == 3 or (isinstance(value, list) and len(value) == 3):
@@ -212,14 +216,16 @@ def pose(content: Named, name: str) -> Poses:
 
 
 def rotation(content: Named, name: str) -> Floats:
-    """Of 3 x 3 numbers; files round."""
+    """Reads a rotation of 3 x 3 numbers, which files round."""
     R = arrays.rotation(content.path, name, matrix(content, name, 3, 3))
     return np.asarray(se3.nearest_rotation(R))
 
 
 def matrix(content: Named, name: str, rows: int, columns: int) -> Floats:
-    """Rows of numbers, or one list of all (msckf_vio); or the object with rows, cols and data of
-    OpenCV and EuRoC.
+    """Reads a matrix.
+
+    It may be rows of numbers, one list of all (msckf_vio), or the object with rows, cols and data
+    of OpenCV and EuRoC.
     """
     value = content.get(name)
     if isinstance(value, dict):
@@ -244,7 +250,10 @@ def _on_body(camera: Named) -> Poses | None:
         return None
     if len(given) > 1:
         raise ForeignFileError(
-            camera.path, f"has {' and '.join(given)}", at=camera.at, due="one of them is expected"
+            camera.path,
+            f"has {' and '.join(given)}",
+            at=camera.at,
+            expected="one of them is expected",
         )
     T = pose(camera, given[0])
     return T if given[0] in TO_CAMERA else se3.inverse(T)
@@ -258,7 +267,7 @@ def _require_same(second: Named, steps: Poses, other: Poses) -> None:
             f"{STEP} and the cameras' transforms to the IMU differ by "
             f"{np.linalg.norm(off[:3]):.3g} m and {np.linalg.norm(off[3:]):.3g} rad",
             at=second.at,
-            due="they should agree: is one of them of another calibration, or inverted?",
+            expected="they should agree: is one of them of another calibration, or inverted?",
         )
 
 
@@ -289,8 +298,8 @@ def _coefficients(camera: Named, model: LensModel) -> tuple[float, ...]:
     value = camera.get(name)
     found = as_numbers(value)
     if found is None or found.ndim != 1 or len(found) not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
-        raise camera.error(name, value, f"{due} numbers are expected for {model}")
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
+        raise camera.error(name, value, f"{expected} numbers are expected for {model}")
     return tuple(camera.array(name, len(found)).tolist())
 
 

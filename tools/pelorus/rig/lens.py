@@ -21,7 +21,7 @@ from pelorus.rig import spheres
 
 
 class LensModel(StrEnum):
-    """How the lens bends a ray."""
+    """A model of a lens's distortion."""
 
     NONE = "none"
     RADTAN = "radtan"
@@ -31,7 +31,7 @@ class LensModel(StrEnum):
     DS = "ds"
 
 
-# How many numbers each may have.
+# How many coefficients each may have.
 COEFFICIENTS = {
     LensModel.NONE: (0,),
     LensModel.RADTAN: (4, 5, 8, 12, 14),
@@ -42,12 +42,12 @@ COEFFICIENTS = {
 }
 NEWTON_STEPS = 10
 DIFFERENCE = 1e-6  # of a ray, for derivatives
-MISS_MAX_PX = 0.01  # a ray must come back to its pixel
+MISS_MAX_PX = 0.01  # a ray's pixel may be off by so much
 
 
 @dataclass(frozen=True)
 class Lens:
-    """fx, fy, cx, cy in px; a width of 0 is not known."""
+    """fx, fy, cx, cy in px, with the distortion; a width of 0 is unknown."""
 
     model: LensModel
     intrinsics: tuple[float, float, float, float]
@@ -76,7 +76,7 @@ class Lens:
         return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
 
     def distort(self, rays: Floats) -> Floats:
-        """(n, 2) x/z and y/z in the camera -> (n, 2) px."""
+        """Maps rays (n, 2), x/z and y/z in the camera, to pixels (n, 2)."""
         if not len(rays):
             return np.empty((0, 2))
         if self._sphere:
@@ -88,10 +88,11 @@ class Lens:
         return np.asarray(pixels, np.float64).reshape(-1, 2)
 
     def undistort(self, pixels: Floats) -> Floats:
-        """(n, 2) px -> (n, 2) x/z and y/z; NaN where the lens has no ray for a pixel.
+        """Maps pixels (n, 2) to rays (n, 2), x/z and y/z; NaN where the lens has no ray for a
+        pixel.
 
-        OpenCV's few iterations to begin with (and the way back from the sphere), then Newton's,
-        until a ray meets its pixel.
+        It begins with OpenCV's few iterations (and the way back from the sphere), then takes
+        Newton's until a ray meets its pixel.
         """
         if not len(pixels):
             return np.empty((0, 2))
@@ -105,7 +106,7 @@ class Lens:
             for _ in range(NEWTON_STEPS):
                 J = self._slope(rays)
                 det = np.abs(np.linalg.det(J))
-                sound = (det > 1) & np.isfinite(det)  # px^2: else the lens folds there
+                sound = (det > 1) & np.isfinite(det)  # px^2: elsewhere the lens folds
                 miss = pixels - self.distort(rays)
                 rays[sound] += np.linalg.solve(J[sound], miss[sound, :, None])[..., 0]
             off = np.linalg.norm(pixels - self.distort(rays), axis=1)
@@ -113,7 +114,7 @@ class Lens:
         return rays
 
     def _slope(self, rays: Floats) -> Floats:
-        """(n, 2, 2) d px / d ray."""
+        """Returns (n, 2, 2) d px / d ray."""
         steps = DIFFERENCE * np.eye(2)
         sides = [self.distort(rays + step) - self.distort(rays - step) for step in steps]
         return np.stack(sides, axis=-1) / (2 * DIFFERENCE)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The configuration of OKVIS and OKVIS 2: a list of cameras, and an IMU's noise.
+"""Reads the configuration of OKVIS and OKVIS 2: a list of cameras, and an IMU's noise.
 
-T_SC brings points of the camera to the IMU; a picture was taken its delay before its stamp.
+T_SC maps points of the camera to the IMU; a picture was taken its delay before its stamp.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DELAYS = ("imageDelay", "image_delay")
 
 
 def is_config(content: Named) -> bool:
-    """By its list of cameras."""
+    """Returns whether it has OKVIS' list of cameras."""
     cameras = content.content.get("cameras")
     return isinstance(cameras, list) and any(
         isinstance(one, dict) and "T_SC" in one for one in cameras
@@ -43,14 +43,14 @@ def is_config(content: Named) -> bool:
 
 
 def read(content: Named, asked: Sequence[str] = ()) -> Rig:
-    """Of two cameras: those asked for by number, else the two that are a pair."""
+    """Reads two cameras: those asked for by number, else the stereo pair."""
     cameras = [
         Named(content.path, one, f"cameras[{k}]") for k, one in enumerate(content.get("cameras"))
     ]
     if len(cameras) < 2:
-        raise ForeignFileError(content.path, "has one camera", due="two are expected")
+        raise ForeignFileError(content.path, "has one camera", expected="two are expected")
     known = [
-        several.Camera((f"cam{k}",), _lens(camera), se3.inverse(pose(camera, "T_SC")))
+        several.RigCamera((f"cam{k}",), _lens(camera), se3.inverse(pose(camera, "T_SC")))
         for k, camera in enumerate(cameras)
     ]
     rig = several.rig(content.path, known, asked)
@@ -75,9 +75,9 @@ def _lens(camera: Named) -> Lens:
     if model is LensModel.NONE:
         count = 0
     if count not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise camera.error(
-            name, camera.content.get(name), f"{due} numbers are expected for {model}"
+            name, camera.content.get(name), f"{expected} numbers are expected for {model}"
         )
     D = tuple(camera.array(name, count).tolist()) if count else ()
     (fx, fy), (cx, cy) = camera.array("focal_length", 2), camera.array("principal_point", 2)

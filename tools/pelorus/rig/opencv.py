@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""OpenCV's stereo calibration: K1 D1 K2 D2 R T, in one file or in two (intrinsics, extrinsics).
+"""Reads OpenCV's stereo calibration: K1 D1 K2 D2 R T, in one file or in two.
 
-R and T (or t) bring points of the first camera to the second one (stereoCalibrate).
+R and T (or t) map points of the first camera to the second one (stereoCalibrate).
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 
-# How the matrix of camera {} is called, and its lens; and what {} may be for the two.
+# Names of the matrix of camera {} and of its lens; and what {} may be for the two.
 MATRICES = ("K{}", "M{}", "CM{}", "cameraMatrix{}", "CameraMatrix{}", "camera_matrix{}")
 DISTORTIONS = ("D{}", "distCoeffs{}", "DistCoeffs{}", "dist_coeffs{}", "distortion{}")
 SIDES = (("1", "2"), ("_1", "_2"), ("L", "R"), ("_left", "_right"), ("Left", "Right"))
 LENSES = (LensModel.NONE, LensModel.RADTAN, LensModel.EQUIDISTANT)
 SHIFTS = ("T", "t")
 SIZES = ("imageSize", "image_size")
-FISHEYE_OR_NOT = 4  # so many coefficients both have
+FISHEYE_OR_NOT = 4  # number of coefficients that both models may have
 
 
 def is_opencv(content: Named) -> bool:
-    """Of a stereo calibration the cameras, or where they stand."""
+    """Returns whether it has the cameras of a stereo calibration, or their relative pose."""
     has_one = any(pattern.format(side[0]) in content for pattern in MATRICES for side in SIDES)
     return has_one or ("R" in content and any(name in content for name in SHIFTS))
 
 
 def stereo(content: Named, model: LensModel | None) -> Rig:
-    """`model` is asked for where the number of coefficients does not tell."""
+    """Reads the pair; `model` is needed where the number of coefficients leaves it open."""
     T_21 = Poses(
         se3.nearest_rotation(arrays.rotation(content.path, "R", matrix(content, "R", 3, 3))),
         _column(content, next((name for name in SHIFTS if name in content), SHIFTS[0])),
@@ -61,7 +61,7 @@ def _lens(content: Named, number: int, model: LensModel | None) -> Lens:
         raise ForeignFileError(
             content.path,
             f"camera {number} has fx {fx:g}, fy {fy:g}, skew {K[0, 1]:g}",
-            due="positive focal lengths and no skew are expected",
+            expected="positive focal lengths and no skew are expected",
         )
     name = _one_of(content, DISTORTIONS, number)
     D = _numbers(content, name)
@@ -78,13 +78,15 @@ def _model(content: Named, name: str, count: int, asked: LensModel | None) -> Le
         raise ForeignFileError(
             content.path,
             f"{name} has 4 numbers, as radtan and a fisheye have",
-            due="--lens radtan or --lens equidistant is expected",
+            expected="--lens radtan or --lens equidistant is expected",
         )
     model = asked if asked in LENSES and asked is not None else LensModel.RADTAN
     if count not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise ForeignFileError(
-            content.path, f"{name} has {count} numbers", due=f"{due} are expected for {model}"
+            content.path,
+            f"{name} has {count} numbers",
+            expected=f"{expected} are expected for {model}",
         )
     return model
 
@@ -106,7 +108,7 @@ def _one_of(content: Named, patterns: tuple[str, ...], number: int) -> str:
     raise ForeignFileError(
         content.path,
         f"lacks {' or '.join(pattern.format(number) for pattern in patterns)}",
-        due=f"there are: {', '.join(content.content) or 'none'}",
+        expected=f"there are: {', '.join(content.content) or 'none'}",
     )
 
 
@@ -114,13 +116,13 @@ def _one_of(content: Named, patterns: tuple[str, ...], number: int) -> str:
 
 
 def xml_words(path: Path, words: str) -> dict[str, Any]:
-    """What cv::FileStorage writes as XML: the same names and matrices as in its YAML."""
+    """Reads what cv::FileStorage writes as XML: the same names and matrices as in its YAML."""
     try:
         root = ET.fromstring(words)
     except ET.ParseError as error:
         raise ForeignFileError(path, f"is no XML: {error}") from None
     if root.tag != "opencv_storage":
-        raise ForeignFileError(path, f"is XML of {root.tag}", due="opencv_storage is expected")
+        raise ForeignFileError(path, f"is XML of {root.tag}", expected="opencv_storage is expected")
     return {one.tag: _value(one) for one in root}
 
 

@@ -36,12 +36,12 @@ TYPES = ("PinHole", "Rectified", "KannalaBrandt8")
 
 
 def is_settings(content: Named) -> bool:
-    """By the left camera's focal length."""
+    """Returns whether it has the left camera's focal length."""
     return "Camera1.fx" in content or "Camera.fx" in content
 
 
 def read(content: Named) -> Rig:
-    """Of the pair, and of the IMU where there is one."""
+    """Reads the pair, and the IMU where there is one."""
     T_BL = next((pose(content, name) for name in ON_BODY if name in content), None)
     T_LB = None if T_BL is None else se3.inverse(T_BL)
     if "LEFT.K" in content:
@@ -70,13 +70,14 @@ def _pair(content: Named, T_LB: Poses | None) -> Rig:
         raise ForeignFileError(
             content.path,
             "is of one camera",
-            due=f"{' or '.join(STEPS)}, Stereo.b, LEFT.K and RIGHT.K, or Camera.bf is expected",
+            expected=f"{' or '.join(STEPS)}, Stereo.b, LEFT.K and RIGHT.K, or Camera.bf is "
+            "expected",
         )
     if any(left.coefficients):
         raise ForeignFileError(
             content.path,
             f"has a baseline alone, and a distortion ({first}.k1)",
-            due=f"{' or '.join(STEPS)} is expected; with a baseline alone the pictures are "
+            expected=f"{' or '.join(STEPS)} is expected; with a baseline alone the pictures are "
             "rectified",
         )
     plain = Lens(LensModel.NONE, left.intrinsics, (), left.width_px, left.height_px)

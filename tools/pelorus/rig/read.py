@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Calibrations of every kind, told apart by what is in them.
+"""Reads calibrations of every kind, which their contents tell apart.
 
 JSON of a rectified pair is the project's own (pelorus.calibration); KINDS lists those of others.
-Beside any of them may stand Kalibr's file of an IMU.
+Kalibr's file of an IMU may accompany any of them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from pelorus.rig.rig import Rig
 
 SECTION = re.compile(r"\[\w+\]\s*$")
 
-# In OpenVINS' estimator_config.yaml: Kalibr's files, beside it.
+# In OpenVINS' estimator_config.yaml: names of Kalibr's files.
 ELSEWHERE = ("relative_config_imucam", "relative_config_imu")
 
 NO_CAMERA = Camera(fx_px=1.0, fy_px=1.0, cx_px=0.0, cy_px=0.0, baseline_m=1.0)
@@ -43,12 +43,12 @@ NO_CAMERA = Camera(fx_px=1.0, fy_px=1.0, cx_px=0.0, cy_px=0.0, baseline_m=1.0)
 
 @dataclass(frozen=True)
 class Calibrated:
-    """The HEADER, and the cameras as they are where the calibration is not of a rectified pair."""
+    """The HEADER, and the raw cameras where the calibration is not of a rectified pair."""
 
     header: Header
     rig: Rig | None = None
     imu: ImuModel = field(default_factory=ImuModel)
-    chosen: tuple[str, ...] = ()  # what is said of the choice of cameras
+    chosen: tuple[str, ...] = ()  # remarks on the choice of cameras
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class Calibrated:
 
 
 def is_own(paths: Sequence[Path]) -> bool:
-    """Whether this is the project's own JSON, of a rectified pair."""
+    """Returns whether this is the project's own JSON, of a rectified pair."""
     if len(paths) != 1 or paths[0].suffix.lower() != ".json":
         return False
     content = _content(paths[0])
@@ -70,8 +70,10 @@ def read(
     lens: LensModel | None = None,
     cameras: Sequence[str] = (),
 ) -> Calibrated:
-    """`extrinsic` says where the left camera sits on the body, whatever the other files say;
-    `cameras` names two where a file has more.
+    """Reads a calibration.
+
+    `extrinsic` replaces the left camera's place on the body in the other files; `cameras` names two
+    where a file has more.
     """
     if is_own(paths):
         header = calibration.read(paths[0])
@@ -83,9 +85,10 @@ def read(
 
 
 def without_cameras(paths: Sequence[Path], name: str) -> Calibrated:
-    """Of a recording without pictures: an IMU's file, or none; the HEADER's camera stands for none.
+    """Returns the calibration of a recording without pictures: an IMU's file, or none.
 
-    A file with cameras is taken too; they are of no use then.
+    The HEADER's camera is a placeholder. A file with cameras is accepted, too; they are of no use
+    then.
     """
     if is_own(paths):
         return read(paths, name)
@@ -94,14 +97,14 @@ def without_cameras(paths: Sequence[Path], name: str) -> Calibrated:
         return read(paths, name)
     if any(not kalibr.is_imu(content) for content in contents) or len(contents) > 1:
         raise ForeignFileError(
-            paths[-1], "is no IMU's file, or a second one", due="one is expected"
+            paths[-1], "is no IMU's file, or a second one", expected="one is expected"
         )
     imu = kalibr.imu(contents[0]) if contents else ImuModel()
     return Calibrated(Header(NO_CAMERA, name=header_name(name)), imu=imu)
 
 
 def of_rig(rig: Rig, name: str, extrinsic: Path | None = None) -> Calibrated:
-    """What a rig says."""
+    """Returns the calibration of a rig."""
     if extrinsic is not None:
         rig = rig.on_body(calibration.read_extrinsic(extrinsic))
     header = rig.header(rig.rectification(), name)
@@ -112,7 +115,7 @@ def of_rig(rig: Rig, name: str, extrinsic: Path | None = None) -> Calibrated:
 def read_rig(
     paths: Sequence[Path], lens: LensModel | None = None, cameras: Sequence[str] = ()
 ) -> Rig:
-    """What one file or several say together."""
+    """Returns the rig that one file or several describe together."""
     contents = _contents(paths)
     kinds = [next((kind for kind in KINDS if kind.is_one(one)), None) for one in contents]
     for content, kind in zip(contents, kinds, strict=True):
@@ -120,42 +123,44 @@ def read_rig(
             raise ForeignFileError(
                 content.path,
                 "is no calibration that is known",
-                due=f"{', '.join(kind.name for kind in KINDS)} or the project's JSON is "
+                expected=f"{', '.join(kind.name for kind in KINDS)} or the project's JSON is "
                 "expected; there "
                 f"are: {', '.join(content.content) or 'no names'}",
             )
     found = [kind for kind in kinds if kind is not None]
     if not found:
         raise ForeignFileError(
-            paths[0], "is of an IMU alone", due="one of the cameras is expected too"
+            paths[0], "is of an IMU alone", expected="one of the cameras is expected too"
         )
     if any(kind is not found[0] for kind in found):
         names = " and ".join(dict.fromkeys(kind.name for kind in found))
         raise ForeignFileError(
-            paths[0], f"and the others are {names}", due="files of one are expected"
+            paths[0], f"and the others are {names}", expected="files of one are expected"
         )
     files = [content for content, kind in zip(contents, kinds, strict=True) if kind is not None]
     if len(files) not in found[0].files:
-        due = " or ".join(map(str, found[0].files))
+        expected = " or ".join(map(str, found[0].files))
         raise ForeignFileError(
             files[-1].path,
             f"{len(files)} files of cameras",
-            due=f"{due} of {found[0].name} are expected",
+            expected=f"{expected} of {found[0].name} are expected",
         )
     rig = found[0].read(files, lens, cameras)
     imus = [content for content, kind in zip(contents, kinds, strict=True) if kind is None]
     if len(imus) > 1:
-        raise ForeignFileError(imus[1].path, "is the second file of an IMU", due="one is expected")
+        raise ForeignFileError(
+            imus[1].path, "is the second file of an IMU", expected="one is expected"
+        )
     return kalibr.with_imu(rig, imus[0]) if imus else rig
 
 
 def topics(paths: Sequence[Path]) -> set[str]:
-    """Of pictures, that these files name."""
+    """Returns the topics of pictures that these files name."""
     return {topic for content in _contents(paths) for topic in kalibr.topics(content)}
 
 
 def are_of_imu(paths: Sequence[Path]) -> bool:
-    """Whether these files are of an IMU alone: the cameras are told elsewhere."""
+    """Returns whether these files are of an IMU alone, without cameras."""
     contents = _contents(paths)
     return bool(contents) and all(
         kalibr.is_imu(content) and not any(kind.is_one(content) for kind in KINDS)
@@ -164,14 +169,14 @@ def are_of_imu(paths: Sequence[Path]) -> bool:
 
 
 def with_imu(rig: Rig, paths: Sequence[Path]) -> Rig:
-    """The rig on the IMU that the one file of these describes."""
+    """Returns the rig on the IMU that one of these files describes."""
     if len(paths) > 1:
-        raise ForeignFileError(paths[1], "is the second file of an IMU", due="one is expected")
+        raise ForeignFileError(paths[1], "is the second file of an IMU", expected="one is expected")
     return kalibr.with_imu(rig, _content(paths[0]))
 
 
 def _contents(paths: Sequence[Path]) -> list[Named]:
-    """Of the files; in place of one that only names others beside it, of these."""
+    """Returns the contents of the files; of one that only names others, those of the others."""
     found: list[Named] = []
     for path in paths:
         content = _content(path)
@@ -181,7 +186,7 @@ def _contents(paths: Sequence[Path]) -> list[Named]:
 
 
 def _content(path: Path) -> Named:
-    """The names in a file, by what it looks like: JSON, XML, sections, else YAML."""
+    """Returns the names in a file, by its format: JSON, XML, sections, else YAML."""
     words = foreign.text(path, foreign.JSON_BYTES_MAX).lstrip()
     if path.suffix.lower() == ".json":
         return Named(path, foreign.json_words(path, words))
@@ -193,8 +198,8 @@ def _content(path: Path) -> Named:
     return Named(path, foreign.yaml_words(path, words))
 
 
-class Kind(NamedTuple):
-    """A program's calibration, of so many files."""
+class CalibrationKind(NamedTuple):
+    """A program's calibration, with its number of files."""
 
     name: str
     is_one: Callable[[Named], bool]
@@ -207,34 +212,42 @@ def _opencv(contents: list[Named], lens: LensModel | None, _: Sequence[str]) -> 
     return opencv.stereo(Named(contents[0].path, merged), lens)
 
 
-# In this order: a name that several use is asked for last.
+# Tested in this order: names that several programs use come last.
 KINDS = (
-    Kind("Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _, of: kalibr.camchain(c[0], of)),
-    Kind("sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, *_: kalibr.pair(*c)),
-    Kind(
+    CalibrationKind(
+        "Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _, of: kalibr.camchain(c[0], of)
+    ),
+    CalibrationKind(
+        "sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, *_: kalibr.pair(*c)
+    ),
+    CalibrationKind(
         "camera_info of ROS",
         camera_info.is_camera_info,
         (2,),
         lambda c, lens, _: camera_info.pair(c[0], c[1], lens),
     ),
-    Kind("ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, *_: orb_slam.read(c[0])),
-    Kind(
+    CalibrationKind(
+        "ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, *_: orb_slam.read(c[0])
+    ),
+    CalibrationKind(
         "VINS-Fusion's configuration",
         lambda content: vins.is_config(content) or vins.is_camera(content),
         (1, 2, 3),
         lambda c, *_: vins.read(c),
     ),
-    Kind(
+    CalibrationKind(
         "Basalt's calibration", basalt.is_calibration, (1,), lambda c, _, of: basalt.read(c[0], of)
     ),
-    Kind("OKVIS's configuration", okvis.is_config, (1,), lambda c, _, of: okvis.read(c[0], of)),
-    Kind("SVO's or maplab's rig", svo.is_rig, (1,), lambda c, _, of: svo.read(c[0], of)),
-    Kind(
+    CalibrationKind(
+        "OKVIS's configuration", okvis.is_config, (1,), lambda c, _, of: okvis.read(c[0], of)
+    ),
+    CalibrationKind("SVO's or maplab's rig", svo.is_rig, (1,), lambda c, _, of: svo.read(c[0], of)),
+    CalibrationKind(
         "DepthAI's calibration",
         depthai.is_calibration,
         (1,),
         lambda c, _, of: depthai.read(c[0], of),
     ),
-    Kind("a ZED's .conf", zed.is_conf, (1,), lambda c, *_: zed.read(c[0])),
-    Kind("OpenCV's stereo calibration", opencv.is_opencv, (1, 2), _opencv),
+    CalibrationKind("a ZED's .conf", zed.is_conf, (1,), lambda c, *_: zed.read(c[0])),
+    CalibrationKind("OpenCV's stereo calibration", opencv.is_opencv, (1, 2), _opencv),
 )

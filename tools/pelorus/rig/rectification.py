@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Two cameras as if they looked the same way, side by side: what a HEADER's camera means.
+"""Rectification of two cameras to the pair of a HEADER: same direction, side by side.
 
-The new x axis is the baseline, z is half way between the two optical axes. One focal length for
-both, so that the pictures have no empty edges, on which a tracker would find corners.
+The new x axis is the baseline, z is half way between the two optical axes. Both have one focal
+length, chosen so that the pictures have no empty edges, on which a tracker would find corners.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from pelorus.se3 import Poses
 
 Gray = NDArray[np.uint8]
 
-SIDEWAYS_MIN = 0.5  # of the baseline, across the direction of view
-ANGLE_MAX_DEG = 70.0  # off the axis; beyond, a pixel of a fisheye becomes a dozen
-ZOOM = (0.8, 2.0)  # of the cameras' own focal length
+SIDEWAYS_MIN = 0.5  # of the baseline, across the viewing direction
+ANGLE_MAX_DEG = 70.0  # off the axis; beyond, one pixel of a fisheye becomes a dozen
+ZOOM = (0.8, 2.0)  # ratio to the cameras' own focal length
 ZOOM_STEPS = 49
 EDGE_POINTS = 25  # of each side of a picture
 
@@ -38,7 +38,7 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True)
 class Rectification:
-    """`camera` is what the rectified pixels belong to."""
+    """The rectification; `camera` is that of the rectified pixels."""
 
     camera: Camera
     left: Side
@@ -48,7 +48,7 @@ class Rectification:
 
     @classmethod
     def of(cls, left: Lens, right: Lens, T_RL: Poses) -> Rectification:
-        """ValueError where the two do not stand side by side, the second one on the right."""
+        """Rectifies a pair; raises ValueError unless the second camera stands on the right."""
         R_left = _towards(T_RL)
         sides = Side(left, R_left), Side(right, R_left @ T_RL.R.T)
         width, height = left.width_px, left.height_px
@@ -67,7 +67,7 @@ class Rectification:
         return found
 
     def pixels(self, raw: Floats) -> Floats:
-        """(n, 4) px as the cameras saw them, uL vL uR vR -> rectified; NaN where that is none."""
+        """Rectifies (n, 4) raw pixels, uL vL uR vR; NaN where there is none."""
         return np.hstack(
             [
                 self._project(_turned(side.lens.undistort(raw[:, columns]), side.R))
@@ -76,7 +76,7 @@ class Rectification:
         )
 
     def pictures(self, left: Gray, right: Gray) -> tuple[Gray, Gray]:
-        """The pair, resampled."""
+        """Returns the pair, resampled."""
         pair = [
             np.asarray(cv2.remap(picture, *maps, cv2.INTER_LINEAR), np.uint8)
             for picture, maps in zip((left, right), self._maps, strict=True)
@@ -104,14 +104,14 @@ class Rectification:
         return np.where(seen[:, None], np.stack((u, v), axis=-1), np.nan)
 
     def _source(self, side: Side, pixels: Floats) -> Floats:
-        """Where rectified pixels lie in the picture that the camera took."""
+        """Returns the raw pixels of rectified ones."""
         camera = self.camera
         rays = (pixels - [camera.cx_px, camera.cy_px]) / [camera.fx_px, camera.fy_px]
         x, y, z = _turned(rays, side.R.T).T
         return side.lens.distort(np.stack((x / z, y / z), axis=-1))
 
     def _filled(self) -> bool:
-        """Whether the edges of both rectified pictures show something."""
+        """Returns whether the edges of both rectified pictures show something."""
         across = np.linspace(0, self.width_px - 1, EDGE_POINTS)
         down = np.linspace(0, self.height_px - 1, EDGE_POINTS)
         edges = [np.column_stack((across, np.full_like(across, v))) for v in (down[0], down[-1])]
@@ -125,7 +125,7 @@ class Rectification:
 
 
 def _towards(T_RL: Poses) -> Floats:
-    """From the left camera into the rectified one."""
+    """Returns the rotation from the left camera into the rectified one."""
     at = -T_RL.R.T @ T_RL.p
     x = at / np.linalg.norm(at)
     view = np.array([0, 0, 1.0]) + T_RL.R[2]
@@ -145,7 +145,7 @@ def _turned(rays: Floats, R: Floats) -> Floats:
 
 
 def _centre(sides: tuple[Side, Side], f: float) -> tuple[float, float]:
-    """Where the middle of both pictures comes to lie in the middle, on average."""
+    """Returns the principal point that brings both pictures' centres to the middle, on average."""
     centres = []
     for lens, R in sides:
         middle = np.array(lens.intrinsics[2:])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What calibrations of every kind say of a stereo camera on a body."""
+"""A stereo camera on a body, as calibrations of every kind describe it."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rectification import Rectification, Side
 from pelorus.se3 import Poses
 
-SAME = 1e-9  # so little off, a pair counts as rectified
+SAME = 1e-9  # a smaller error counts as rectified
 
 
 @dataclass(frozen=True)
 class Rig:
-    """q_R = T_RL q_L; q_L = T_LB s_B, None where the file says nothing of a body."""
+    """Both cameras: q_R = T_RL q_L; q_L = T_LB s_B, None where the file has no body."""
 
     path: Path
     left: Lens
     right: Lens
     T_RL: Poses
     T_LB: Poses | None = None
-    imu: ImuModel = field(default_factory=ImuModel)  # where the file tells it
+    imu: ImuModel = field(default_factory=ImuModel)  # where the file has it
     offset_s: float = 0.0  # the body's clock = the cameras' + offset
     swapped: bool = False  # the file's second camera is the left one
     topics: tuple[str, ...] = ()  # of the left and the right camera, where the file names them
-    T_LF: Poses = se3.IDENTITY  # from the frame that its messages name: rectified, it is turned
+    T_LF: Poses = se3.IDENTITY  # from the frame in its messages, which rectification turns
     others: tuple[Rig, ...] = ()  # of the same cameras at other resolutions
-    remarks: tuple[str, ...] = ()  # of the choice of cameras, where there are more than two
+    remarks: tuple[str, ...] = ()  # on the choice of cameras, where there are more than two
 
     @classmethod
     def of_cameras(
         cls, path: Path, first: Lens, second: Lens, T_21: Poses, T_1B: Poses | None = None
     ) -> Rig:
-        """Whichever of the two stands on the left becomes the left one."""
+        """Returns the rig of two cameras; whichever stands on the left becomes the left one."""
         arrays.require_baseline(path, float(np.linalg.norm(T_21.p)))
         x = -(T_21.R.T @ T_21.p)[0]
         if x > 0:
@@ -60,11 +60,11 @@ class Rig:
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
-        """Of the pictures for which it was made, width and height; 0 where it does not say."""
+        """Returns widths and heights of the pictures for which it was made; 0 where unknown."""
         return [(rig.left.width_px, rig.left.height_px) for rig in (self, *self.others)]
 
     def of_size(self, width_px: int, height_px: int) -> Rig:
-        """The one of pictures of this size, else the first."""
+        """Returns the rig for pictures of this size, else the first one."""
         size = width_px, height_px
         found = (self, *self.others)[self.sizes.index(size) if size in self.sizes else 0]
         left, right = found.left.sized(*size), found.right.sized(*size)
@@ -72,7 +72,7 @@ class Rig:
 
     @property
     def is_rectified(self) -> bool:
-        """Whether its pixels are those of a HEADER's camera as they are."""
+        """Returns whether its pixels are those of a HEADER's camera without rectification."""
         T = self.T_RL
         apart = np.abs(T.R - np.eye(3)).max() + np.abs(T.p[1:]).max()
         plain = self.left.model is LensModel.NONE and self.right.model is LensModel.NONE
@@ -90,12 +90,12 @@ class Rig:
             raise ForeignFileError(self.path, str(error)) from None
 
     def header(self, rectification: Rectification, name: str) -> Header:
-        """Of the rectified camera."""
+        """Returns the HEADER of the rectified camera; raises ForeignFileError without a body."""
         if self.T_LB is None:
             raise ForeignFileError(
                 self.path,
                 "does not say where the camera sits on the body",
-                due="a file with T_cam_imu or T_imu_cam is expected (camchain-imucam), or "
+                expected="a file with T_cam_imu or T_imu_cam is expected (camchain-imucam), or "
                 "--extrinsic "
                 "FILE: JSON with R_CB and t_CB_m, or R_BC and t_BC_m",
             )
@@ -112,7 +112,7 @@ class Rig:
         )
 
     def on_body_clock(self, t_ns: Times) -> Times:
-        """Times of pictures, which the cameras' clock gave."""
+        """Returns pictures' times, given on the cameras' clock, on the body's."""
         shifted = t_ns + round(self.offset_s * 1e9)
         if len(shifted) and shifted[0] < 0:
             raise PelorusError(
@@ -122,10 +122,10 @@ class Rig:
 
 
 def rigid(path: Path, name: str, matrix: Floats) -> Poses:
-    """The 4 x 4 matrix as a pose. Files round: its rotation is made one."""
+    """Returns a 4 x 4 matrix as a pose; its rotation, which files round, is made exact."""
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise ForeignFileError(
-            path, f"the last row of {name} is {matrix[3]}", due="0 0 0 1 is expected"
+            path, f"the last row of {name} is {matrix[3]}", expected="0 0 0 1 is expected"
         )
     R = arrays.rotation(path, name, matrix[:3, :3])
     return Poses(se3.nearest_rotation(R), matrix[:3, 3].copy())

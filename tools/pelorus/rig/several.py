@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Which two of a rig's cameras are the stereo pair.
+"""Chooses the stereo pair among a rig's cameras.
 
-A pair is made of two like cameras that look the same way: of equal lens and resolution, with their
-axes within 30 degrees. A colour camera between two infrared ones is none of the pair, wherever the
+A pair has two similar cameras that look the same way: of equal lens and resolution, with their axes
+within 30 degrees. So a colour camera between two infrared ones is not in the pair, wherever the
 file lists it.
 """
 
@@ -21,14 +21,14 @@ from pelorus.rig.lens import Lens
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 
-SAME_FOCAL = 0.05  # of it: two cameras of one kind differ by less
+SAME_FOCAL = 0.05  # relative difference of two cameras of one kind
 APART_MAX_RAD = radians(30.0)
 
 
-class Camera(NamedTuple):
-    """A camera of several; `T` brings points of a frame that all share to it."""
+class RigCamera(NamedTuple):
+    """A camera of several; `T` maps points of a common frame to it."""
 
-    names: tuple[str, ...]  # what the file calls it: cam0, its topic
+    names: tuple[str, ...]  # in the file: cam0, its topic
     lens: Lens
     T: Poses
 
@@ -38,14 +38,14 @@ class Camera(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """Positions of the two in the list, and what is to be said of the choice."""
+    """The two cameras' positions in the list, and remarks on the choice."""
 
     first: int
     second: int
     remarks: tuple[str, ...] = ()
 
 
-def rig(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Rig:
+def rig(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str] = ()) -> Rig:
     """Returns the rig of the chosen pair; the frame that all share is its body."""
     chosen = pair(path, cameras, asked)
     first, second = cameras[chosen.first], cameras[chosen.second]
@@ -56,7 +56,7 @@ def rig(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Rig
     return replace(found, topics=ordered, remarks=chosen.remarks)
 
 
-def pair(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Chosen:
+def pair(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str] = ()) -> Chosen:
     """Returns the two that the user asks for by name, else the first two that are alike."""
     if asked:
         return Chosen(*_asked(path, cameras, asked))
@@ -78,24 +78,26 @@ def pair(path: Path, cameras: Sequence[Camera], asked: Sequence[str] = ()) -> Ch
     return Chosen(first, second, (remark,))
 
 
-def _asked(path: Path, cameras: Sequence[Camera], asked: Sequence[str]) -> tuple[int, int]:
+def _asked(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str]) -> tuple[int, int]:
     found = []
     for name in asked:
         of_name = [k for k, camera in enumerate(cameras) if name in camera.names]
         if len(of_name) != 1:
             listed = ", ".join(camera.words for camera in cameras)
             raise ForeignFileError(
-                path, f"has no camera called {name}", due=f"there are: {listed} (--cameras)"
+                path, f"has no camera called {name}", expected=f"there are: {listed} (--cameras)"
             )
         found += of_name
     if len(found) != 2 or found[0] == found[1]:
         raise ForeignFileError(
-            path, f"--cameras {','.join(asked)}", due="two cameras, parted by a comma, are expected"
+            path,
+            f"--cameras {','.join(asked)}",
+            expected="two cameras, parted by a comma, are expected",
         )
     return found[0], found[1]
 
 
-def _alike(one: Camera, other: Camera) -> bool:
+def _alike(one: RigCamera, other: RigCamera) -> bool:
     a, b = one.lens, other.lens
     same_size = (a.width_px, a.height_px) == (b.width_px, b.height_px)
     off = abs(a.intrinsics[0] / b.intrinsics[0] - 1)

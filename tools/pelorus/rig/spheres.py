@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Lenses that project by way of a sphere, for wide angles: what happens before K.
+"""Lenses for wide angles that project by way of a sphere: the part before K.
 
 omni   unified (Mei and Rives 2007): onto a sphere, seen from a point xi above its middle
 eucm   enhanced unified (Khomutenko et al. 2016): alpha, beta
 ds     double sphere (Usenko et al. 2018): xi, alpha
 
-`onto_plane` brings rays (n, 2), x/z and y/z, to the plane m of a pinhole, `from_plane` back; NaN
-where there is no ray ahead. Omni has distortion as of a pinhole behind that.
+`onto_plane` maps rays (n, 2), x/z and y/z, to the plane m of a pinhole, `from_plane` maps back; NaN
+where there is no ray ahead. Omni is followed by a pinhole's distortion.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ PARAMETERS = {"omni": 1, "eucm": 2, "ds": 2}  # before those of the distortion
 
 
 def onto_plane(model: str, parameters: tuple[float, ...], rays: Floats) -> Floats:
-    """Rays ahead of the camera -> m."""
+    """Maps rays ahead of the camera to m."""
     r2 = np.sum(rays**2, axis=1)
     if model == "eucm":
         alpha, beta = parameters
@@ -33,7 +33,7 @@ def onto_plane(model: str, parameters: tuple[float, ...], rays: Floats) -> Float
 
 
 def from_plane(model: str, parameters: tuple[float, ...], m: Floats) -> Floats:
-    """m -> rays; NaN where none is ahead."""
+    """Maps m to rays; NaN where none is ahead."""
     r2 = np.sum(m**2, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         if model == "omni":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""SVO's and maplab's camera rigs: a list `cameras`, each with a `camera` and a T_B_C.
+"""Reads SVO's and maplab's camera rigs: a list `cameras`, each with a `camera` and a T_B_C.
 
-T_B_C brings points of the camera to the body, which is the IMU.
+T_B_C maps points of the camera to the body, which is the IMU.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ON_BODY = "T_B_C"
 
 
 def is_rig(content: Named) -> bool:
-    """By a list of cameras that say where they stand."""
+    """Returns whether it has a list of cameras with poses."""
     cameras = content.content.get("cameras")
     return isinstance(cameras, list) and any(
         isinstance(one, dict) and "camera" in one and ON_BODY in one for one in cameras
@@ -43,17 +43,19 @@ def is_rig(content: Named) -> bool:
 
 
 def read(content: Named, asked: Sequence[str] = ()) -> Rig:
-    """Of two cameras: those asked for by label or number, else the two that are a pair."""
+    """Reads two cameras: those asked for by label or number, else the stereo pair."""
     listed = content.get("cameras")
     if len(listed) < 2 or not all(isinstance(one, dict) for one in listed):
-        raise ForeignFileError(content.path, f"has {len(listed)} camera", due="two are expected")
+        raise ForeignFileError(
+            content.path, f"has {len(listed)} camera", expected="two are expected"
+        )
     each = [Named(content.path, one, f"cameras[{k}]") for k, one in enumerate(listed)]
     cameras = [_camera(one, k) for k, one in enumerate(each)]
     return replace(several.rig(content.path, cameras, asked), imu=_imu(content))
 
 
 def _imu(content: Named) -> ImuModel:
-    """Its densities, where SVO's file has some that are not 0."""
+    """Returns the IMU's densities, where SVO's file has nonzero ones."""
     if "imu_params" not in content:
         return ImuModel()
     imu = content.object("imu_params")
@@ -68,7 +70,7 @@ def _imu(content: Named) -> ImuModel:
     )
 
 
-def _camera(one: Named, k: int) -> several.Camera:
+def _camera(one: Named, k: int) -> several.RigCamera:
     inner = one.object("camera")
     inner.word("type", ("pinhole",))
     size = int(inner.number("image_width")), int(inner.number("image_height"))
@@ -76,7 +78,7 @@ def _camera(one: Named, k: int) -> several.Camera:
     model, D = _distortion(inner)
     lens = Lens(model, (fx, fy, cx, cy), D, *size)
     label = str(inner.content.get("label", ""))
-    return several.Camera((f"cam{k}", label), lens, se3.inverse(pose(one, ON_BODY)))
+    return several.RigCamera((f"cam{k}", label), lens, se3.inverse(pose(one, ON_BODY)))
 
 
 def _distortion(camera: Named) -> tuple[LensModel, tuple[float, ...]]:
@@ -89,8 +91,8 @@ def _distortion(camera: Named) -> tuple[LensModel, tuple[float, ...]]:
     parameters = distortion.object("parameters")
     count = len(parameters.get("data"))
     if count not in COEFFICIENTS[model]:
-        due = " or ".join(map(str, COEFFICIENTS[model]))
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise parameters.error(
-            "data", parameters.get("data"), f"{due} numbers are expected for {model}"
+            "data", parameters.get("data"), f"{expected} numbers are expected for {model}"
         )
     return model, tuple(parameters.array("data", count).tolist())

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""VINS-Fusion's configuration, and the files of its two cameras that it names (camodocal's).
+"""Reads VINS-Fusion's configuration, and the files of its two cameras (camodocal's).
 
-body_T_cam0 brings points of the camera to the IMU; the IMU's clock is the pictures' plus td.
+body_T_cam0 maps points of the camera to the IMU; the IMU's clock is the pictures' plus td.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ NOISE = ("acc_n", "gyr_n", "acc_w", "gyr_w")
 
 
 def is_config(content: Named) -> bool:
-    """The main file."""
+    """Returns whether it is the main file."""
     return "cam0_calib" in content and "num_of_cam" in content
 
 
 def is_camera(content: Named) -> bool:
-    """A camera's."""
+    """Returns whether it is a camera's file."""
     return "model_type" in content and "projection_parameters" in content
 
 
 def read(contents: list[Named]) -> Rig:
-    """The configuration; the cameras' files beside it, if they are not given, too."""
+    """Reads the configuration, and the cameras' files beside it if they are not given."""
     configs = [content for content in contents if is_config(content)]
     if len(configs) != 1:
         raise ForeignFileError(
             contents[0].path,
             "is of one camera, and does not say where it stands",
-            due="VINS-Fusion's configuration (body_T_cam0, cam0_calib) is expected with it",
+            expected="VINS-Fusion's configuration (body_T_cam0, cam0_calib) is expected with it",
         )
     config = configs[0]
     if config.number("num_of_cam") != 2:
         raise ForeignFileError(
-            config.path, "is not of two cameras", due="num_of_cam: 2 is expected"
+            config.path, "is not of two cameras", expected="num_of_cam: 2 is expected"
         )
     T_B1, T_B2 = (pose(config, f"body_T_{camera}") for camera in CAMERAS)
     T_21 = se3.compose(se3.inverse(T_B2), T_B1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The factory calibration of a ZED (SN12345.conf): sections for each resolution, in millimetres.
+"""Reads a ZED's factory calibration (SN12345.conf): sections for each resolution, in millimetres.
 
 R = Exp(RX, CV, RZ) turns points of the left camera to the right one, which stands Baseline, TY, TZ
 from it: q_R = R q_L - (Baseline, TY, TZ).
@@ -32,7 +32,7 @@ RADTAN, RATIONAL = ("k1", "k2", "p1", "p2", "k3"), ("k4", "k5", "k6")
 
 
 def sections(path: Path, words: str) -> Named:
-    """Of a text with [sections]; names are in small letters."""
+    """Parses a text with [sections]; names become lower case."""
     parser = configparser.ConfigParser(
         interpolation=None, strict=False, comment_prefixes=("#", ";")
     )
@@ -55,12 +55,12 @@ def _numbers(section: dict[str, str]) -> dict[str, float | str]:
 
 
 def is_conf(content: Named) -> bool:
-    """By its sections."""
+    """Returns whether it has a ZED's sections."""
     return "stereo" in content and any(f"left_cam_{size}" in content for size in SIZES)
 
 
 def read(content: Named) -> Rig:
-    """The rig of each resolution; the pictures say which is theirs."""
+    """Returns the rig of each resolution; the pictures' size selects one."""
     there = [
         size for size in SIZES if f"left_cam_{size}" in content and f"right_cam_{size}" in content
     ]

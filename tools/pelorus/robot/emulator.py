@@ -28,7 +28,7 @@ ELF = b"\x7fELF"
 
 
 def image_of(board: str) -> Path:
-    """The firmware that tools/robot-demo.sh builds: below this folder, or in the source tree."""
+    """Returns the firmware of tools/robot-demo.sh: below this folder, or in the source tree."""
     if board not in MACHINES:
         raise PelorusError(f"there is no board {board}; QEMU can be {', '.join(MACHINES)}")
     name = IMAGES / f"pelorus-{board}-n32.elf"
@@ -91,11 +91,11 @@ class Emulator:
         self._folder.cleanup()
 
     def connect(self) -> Link:
-        """The board's UART. The board starts with the first connection."""
+        """Connects to the board's UART; the board starts with the first connection."""
         return self._connect(self._uart)
 
     def connect_telemetry(self) -> Link:
-        """Its second UART; to miss nothing, connect it first."""
+        """Connects to its second UART, which must come first if nothing is to be missed."""
         return self._connect(self._telemetry)
 
     def _connect(self, path: Path) -> Link:
@@ -105,7 +105,7 @@ class Emulator:
             raise PelorusError(f"{self.board}: {self.trouble() or error}") from error
 
     def trouble(self, patience_s: float = 0.0) -> str:
-        """What the emulator said, if it has stopped, or does so in that time; else nothing."""
+        """Returns the emulator's words if it has stopped, or stops within that time; else empty."""
         try:
             self._process.wait(patience_s)
         except subprocess.TimeoutExpired:
@@ -114,7 +114,7 @@ class Emulator:
         return f"QEMU stopped with status {self._process.returncode}: {self._log.read().strip()}"
 
     def reset(self) -> None:
-        """Press the board's reset button."""
+        """Presses the board's reset button."""
         with socket.socket(socket.AF_UNIX) as control:
             control.settimeout(STOP_S)
             control.connect(str(self._control))

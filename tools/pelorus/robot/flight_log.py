@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The flight recorder: what host and board said to each other, as a recording that can be replayed.
+"""Records what host and board said to each other, for a replay.
 
-A board tells its settings in answer to the first data, and a replay must know them before: so the
-first data is held back until they come. Every message is handed to the system at once, so that a
-log which is cut short, by whatever, is whole up to there.
+A board sends its settings in answer to the first data, and a replay must have them before: so the
+first data are held back until they come. Every message is handed to the system at once, so that a
+log that is cut short is complete up to there.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ SETUP_KINDS = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK, Kind.START)
 
 
 class FlightLog:
-    """Takes messages in the order in which they are sent and heard."""
+    """Takes messages in the order in which they are sent and received."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -27,7 +27,7 @@ class FlightLog:
         self._settled = False  # the settings are in the log, or will not come
 
     def keep(self, message: Message, heard: bool = False) -> None:
-        """Add a message that was sent, or heard from the board: its CONFIG has the settings."""
+        """Adds a message that was sent, or received from the board: CONFIG has the settings."""
         if heard and isinstance(message, Config) and message.build_fingerprint:
             self._write(message)
             self.release()
@@ -36,17 +36,17 @@ class FlightLog:
         else:
             self._held.append(message)
             if isinstance(message, Report) and message.subject == Kind.STEREO:
-                self.release()  # a frame was answered, and no settings came before
+                self.release()  # a frame was answered, without settings before
 
     def release(self) -> None:
-        """Write what is held back; nothing is from here on."""
+        """Writes what is held back; from then on nothing is."""
         self._settled = True
         held, self._held = self._held, []
         for message in held:
             self._write(message)
 
     def end(self, heard: End | None = None) -> None:
-        """Close the recording with END; `heard` is the board's."""
+        """Closes the recording with END; `heard` is the board's."""
         self.release()
         try:
             self._writer.end(heard)

@@ -20,19 +20,19 @@ READ_BYTES = 65536
 WRITE_BYTES = 4096
 CONNECT_S = 10.0
 CONNECT_AGAIN_S = 0.05
-STALL_S = 1800.0  # where a caller has no limit of its own: against hangs
+STALL_S = 1800.0  # default limit of a caller, against hangs
 
 
 class LinkClosed(PelorusError):
-    """The other side is gone."""
+    """The other side has closed the link."""
 
 
 class LinkStalled(PelorusError):
-    """The other side is there, and takes nothing."""
+    """The other side is connected, but takes no bytes."""
 
 
 class Link:
-    """An open file descriptor that takes and gives bytes without blocking."""
+    """An open file descriptor that is read and written without blocking."""
 
     def __init__(self, fd: int, what: str) -> None:
         self._fd = fd
@@ -40,7 +40,7 @@ class Link:
         os.set_blocking(fd, False)
 
     def exchange(self, outgoing: bytes, wait_s: float = 0.0, stall_s: float = STALL_S) -> bytes:
-        """Send everything, and return what came meanwhile: `pieces` in one.
+        """Sends everything, and returns all bytes that came meanwhile (`pieces`).
 
         What came before the link closed is still returned; the next call raises LinkClosed.
         """
@@ -54,10 +54,10 @@ class Link:
         return bytes(incoming)
 
     def pieces(self, outgoing: bytes, wait_s: float, stall_s: float) -> Iterator[bytes]:
-        """Send everything, and yield what comes meanwhile, piece by piece.
+        """Sends everything, and yields what comes meanwhile, piece by piece.
 
-        With nothing (left) to send, wait up to `wait_s` for the first bytes to come. LinkStalled
-        where the other side takes no byte for `stall_s`, whatever it says meanwhile.
+        With nothing (left) to send, waits up to `wait_s` for the first bytes to come. Raises
+        LinkStalled where the other side takes no byte for `stall_s`, whatever it sends meanwhile.
         """
         deadline = time.monotonic() + wait_s
         left = memoryview(outgoing)
@@ -112,7 +112,7 @@ class Link:
 
 
 def _reached(connect: Callable[[], socket.socket], what: str) -> Link:
-    """Connect; the other side may need a moment until it listens."""
+    """Connects; repeats it until the other side listens."""
     deadline = time.monotonic() + CONNECT_S
     while True:
         try:
@@ -131,18 +131,18 @@ def _reached(connect: Callable[[], socket.socket], what: str) -> Link:
 
 
 def tcp(host: str, port: int) -> Link:
-    """A TCP connection, for example to an emulator's or a terminal server's serial port."""
+    """Connects by TCP, for example to an emulator's or a terminal server's serial port."""
 
     def connect() -> socket.socket:
         connection = socket.create_connection((host, port), timeout=CONNECT_S)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # twists do not wait
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # twists are not delayed
         return connection
 
     return _reached(connect, f"{host}:{port}")
 
 
 def unix(path: Path) -> Link:
-    """A local socket."""
+    """Connects to a local socket."""
 
     def connect() -> socket.socket:
         connection = socket.socket(socket.AF_UNIX)

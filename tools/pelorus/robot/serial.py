@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A serial device as a link. The only file that needs termios, which Windows does not have: it is
-imported when a serial device is asked for, so that every other command starts there too.
+"""A serial device as a link.
+
+Only this file needs termios, which Windows does not have. It is imported when a serial device is
+asked for, so that every other command works there.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from pelorus.robot.link import Link
 
 
 def open_serial(device: Path, baud: int) -> Link:
-    """A serial device, raw: 8 data bits, no parity, 1 stop bit, no flow control of its own."""
+    """Opens a serial device, raw: 8 data bits, no parity, 1 stop bit, no flow control."""
     speed = getattr(termios, f"B{baud}", None) if baud else None  # B0 would hang up
     if speed is None:
         raise PelorusError(f"{device}: this system knows no {baud} baud; the boards run at 921600")
@@ -40,7 +42,7 @@ def open_serial(device: Path, baud: int) -> Link:
 
 
 def _set_raw(fd: int, speed: int) -> None:
-    tty.setraw(fd, termios.TCSANOW)  # does not wait for output that no one takes
+    tty.setraw(fd, termios.TCSANOW)  # does not wait for output that no one reads
     settings = termios.tcgetattr(fd)
     settings[2] |= termios.CLOCAL | termios.CREAD
     settings[2] &= ~(termios.CRTSCTS | termios.CSTOPB | termios.PARENB)

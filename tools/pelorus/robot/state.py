@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where in a drive a board is asked to keep its state, or to go on from the one that it kept."""
+"""Adds to a drive the requests that a board keep its state, or continue from a kept one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Data = Twist | Imu | Reading | Truth | Stereo
 
 
 def restored(messages: list[Message], moved: tuple[float, float] = (0.0, 0.0)) -> list[Message]:
-    """The drive with a restore, right before its data, in place of its START.
+    """Returns the drive with a restore right before its data, instead of its START.
 
     `moved` is how far the robot may have moved since it was saved: sigmas in m and rad.
     """
@@ -24,7 +24,7 @@ def restored(messages: list[Message], moved: tuple[float, float] = (0.0, 0.0)) -
 
 
 def saved(messages: list[Message]) -> list[Message]:
-    """The drive with a save behind its data."""
+    """Returns the drive with a save after its data."""
     last = _data_indices(messages)[-1]
     state = State(_time(messages[last]), StateAction.SAVE)
     return [*messages[: last + 1], state, *messages[last + 1 :]]

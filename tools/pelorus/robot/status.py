@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a robot says in numbers, in words: `plr_status`, `plr_health` and `plr_reason` of
-include/pelorus/types.h.
+"""A robot's numbers in words: `plr_status`, `plr_health` and `plr_reason`.
+
+They are defined in include/pelorus/types.h.
 """
 
 from __future__ import annotations
@@ -10,14 +11,14 @@ from pelorus.schema import HEALTHS, REASONS, STATUSES
 
 
 def condition(health: int, reasons: int) -> str:
-    """Health and its reasons (`plr_health`, `plr_reason`): "degraded (the gate is locked)"."""
+    """Returns `plr_health` with its `plr_reason`: "degraded (the gate is locked)"."""
     words = [text for reason, text in REASONS.items() if reasons & reason]
     name = HEALTHS.get(health, f"health {health}")
     return f"{name} ({', '.join(words)})" if words else name
 
 
 def refusal(subject: int, status: int, count: int) -> str:
-    """One line of a summary."""
+    """Returns one line of a summary of refusals."""
     known = subject in list(Kind)
     what = Kind(subject).name if known else f"kind {subject}"
     if subject == 0:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Sends a recording to a board, frame by frame, and keeps what both sides said.
+"""Sends a recording to a board, frame by frame, and records both sides.
 
 The rule of docs/PORTING.md, "Flow control": after each STEREO and each STATE the sender waits for
-the REPORT that answers it, or for a time-out; it never waits without reading. A board that starts
-anew says so in a REPORT; it is then given HEADER, settings and its own last pose, and the
-drive goes on.
+the REPORT that answers it, or for a time-out; it never waits without reading. A board that restarts
+says so in a REPORT; it is then given HEADER, settings and its own last pose, and the drive goes on.
 """
 
 from __future__ import annotations
@@ -42,38 +41,38 @@ from pelorus.robot.status import refusal
 from pelorus.settings import IDS
 from pelorus.wire import DELIMITER, Counts, Reader, encode, end_of
 
-ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
+ANSWER_S = 5.0  # a slow emulated board on a busy machine takes tenths
 QUIET_S = 0.3
-GREETING_S = 3.0  # a board may be in the middle of something
+GREETING_S = 3.0  # a board may be busy
 WARNING, ERROR = 1, 2  # severity of a TEXT
 END_AGAIN_S = 1.0
 STATE_S = 15.0  # a save takes as long as the flash: seconds
-UNANSWERED_MAX = 5  # in a row: then nobody is there
+UNANSWERED_MAX = 5  # in a row: then no board is there
 WINDOW_BYTES = 2048  # half of the board's receive ring
 
 
 @dataclass
-class Outcome:
-    """What came of a stream."""
+class StreamResult:
+    """The result of a stream."""
 
     poses: list[Pose] = field(default_factory=list)  # one a frame
     reports: Counter[int] = field(default_factory=Counter)  # of STEREO, by status
     refused: Counter[tuple[int, int]] = field(
         default_factory=Counter
     )  # (subject, status) of others
-    config: Config | None = None  # in force
+    config: Config | None = None  # settings in force
     texts: list[Text] = field(default_factory=list)
     frames: int = 0  # STEREO sent
     unanswered: int = 0
-    boots: int = 0  # times that the board said it had started
-    restarts: int = 0  # those in mid-drive
+    boots: int = 0  # times that the board reported a start
+    restarts: int = 0  # those during the drive
     worst_update_us: int = 0
     states: list[Report] = field(default_factory=list)  # the answers to STATE
-    state_trouble: str = ""  # why the last STATE was not done
+    state_trouble: str = ""  # why the last STATE failed
 
 
 class Streamer:
-    """One drive over one link."""
+    """Sends one drive over one link."""
 
     def __init__(
         self,
@@ -83,8 +82,8 @@ class Streamer:
         answer_s: float | None = None,
         on_message: Callable[[Message], None] = lambda _: None,
     ) -> None:
-        """`on_message` gets all that the log gets, in the same order."""
-        self.outcome = Outcome()
+        """Takes a link; `on_message` gets all that the log gets, in the same order."""
+        self.outcome = StreamResult()
         self.reader = Reader()
         self._link = link
         self._log = None if log is None else FlightLog(log)
@@ -95,14 +94,14 @@ class Streamer:
         self._sent: Counter[Kind] = Counter()
         self._setup: list[Message] = []
         self._unread_bytes = 0
-        self._awaited: int | None = None  # time of the STEREO that is to be answered
+        self._awaited: int | None = None  # time of the STEREO whose answer is awaited
         self._unanswered_in_a_row = 0
         self._end_heard: End | None = None  # the board's
         self._under_way = False
-        self._board_is_new = False  # it announced itself, and has not been given its set-up yet
+        self._board_is_new = False  # it reported a start, and has not been set up yet
 
-    def run(self, messages: Iterable[Message]) -> Outcome:
-        """Send everything; END goes last, whether it is among the messages or not."""
+    def run(self, messages: Iterable[Message]) -> StreamResult:
+        """Sends everything; END goes last, whether it is among the messages or not."""
         try:
             self.greet()
             for message in messages:
@@ -118,9 +117,9 @@ class Streamer:
         return self.outcome
 
     def greet(self) -> None:
-        """End whatever the board was in the middle of, and let it finish talking.
+        """Ends whatever the board was doing, and lets it finish sending.
 
-        END is answered with END. It is said again while no answer comes: what arrives while a board
+        END is answered with END. It is repeated while no answer comes: what arrives while a board
         boots is lost.
         """
         deadline = time.monotonic() + self.answer_s
@@ -130,14 +129,14 @@ class Streamer:
                 lambda: self._end_heard is not None, min(END_AGAIN_S, deadline - time.monotonic())
             )
         self._await_quiet()
-        self.outcome = Outcome(texts=self.outcome.texts, boots=self.outcome.boots)
-        self.reader.counts = Counts()  # what came before is not this drive's
+        self.outcome = StreamResult(texts=self.outcome.texts, boots=self.outcome.boots)
+        self.reader.counts = Counts()  # of this drive alone
         self._sequence = 1
         self._end_heard = None
         self._under_way = True
 
     def _await_quiet(self) -> None:
-        """Let the board finish what it is saying; a line that is never quiet is no board's."""
+        """Waits until the board has finished sending; a line that is never quiet is no board's."""
         patience_s = max(GREETING_S, self.answer_s)
         deadline = time.monotonic() + patience_s
         while self._exchange(b"", QUIET_S):
@@ -148,13 +147,13 @@ class Streamer:
                 )
 
     def _wait(self, done: Callable[[], bool], patience_s: float) -> None:
-        """Take in what comes, until it is done or the time is up."""
+        """Receives until it is done or the time is up."""
         deadline = time.monotonic() + patience_s
         while not done() and (left := deadline - time.monotonic()) > 0:
             self._exchange(b"", left)
 
     def send(self, message: Message) -> None:
-        """Send one message; for a STEREO or a STATE, wait for the answer."""
+        """Sends one message; for a STEREO or a STATE, waits for the answer."""
         if self._board_is_new:
             self._start_over()
         if (message.kind in SETUP_KINDS or is_restore(message)) and not self.outcome.frames:
@@ -170,7 +169,7 @@ class Streamer:
             self._link_pause()
 
     def finish(self) -> None:
-        """Say END, and hear the board's."""
+        """Sends END, and waits for the board's."""
         self._put(end_of(self._sent), logged=False)
         self._wait(lambda: self._end_heard is not None, self.answer_s)
         if self._log is not None:
@@ -186,7 +185,7 @@ class Streamer:
         self._exchange(frame, 0.0)
 
     def _link_pause(self) -> None:
-        """Give a board time for what has no answer, many twists without a frame between them."""
+        """Gives a board time for messages without an answer, like many twists without a frame."""
         self._exchange(b"", 0.01)
         self._unread_bytes = 0
 
@@ -211,9 +210,11 @@ class Streamer:
             )
 
     def _await_state(self, state: State) -> None:
-        """A board that saves takes nothing meanwhile: what is sent before it is done may be lost.
+        """Waits for a STATE: a board that saves takes nothing, and what is sent meanwhile may be
+        lost.
 
-        Without the state that it was to go on from, a drive would be another one: it ends there.
+        Without the state from which it should continue the drive would be another one: it ends
+        there.
         """
         answers, words = len(self.outcome.states), len(self.outcome.texts)
         patience_s = max(STATE_S, self.answer_s)
@@ -228,14 +229,14 @@ class Streamer:
             raise PelorusError(self.outcome.state_trouble)
 
     def _why_not(self, answer: Report, words_before: int) -> str:
-        """The board's own words since it was asked, if it has said any; nothing if all is well."""
+        """Returns the board's own words since the request; empty if all is well."""
         if answer.status == 0:
             return ""
         words = [text.text for text in self.outcome.texts[words_before:] if text.severity]
         return words[-1] if words else refusal(Kind.STATE, answer.status, 1)
 
     def _exchange(self, outgoing: bytes, wait_s: float) -> bool:
-        """Send and take in; whether anything came."""
+        """Sends and receives; returns whether anything came."""
         came = False
         for piece in self._link.pieces(outgoing, wait_s, self.answer_s):
             came = True
@@ -275,10 +276,10 @@ class Streamer:
         self.outcome.reports[report.status] += 1
         self.outcome.worst_update_us = max(self.outcome.worst_update_us, report.update_us)
         if report.t_ns == self._awaited or (report.status and not report.t_ns):
-            self._awaited = None  # a frame too long for the board is refused unread: at no time
+            self._awaited = None  # a frame too long for the board is refused unread, without a time
 
     def _start_over(self) -> None:
-        """The board has lost its state: give it the set-up, and the pose that it last told."""
+        """Sets a board that lost its state up again, with its own last pose."""
         self._note("the board started anew: it is given its set-up again, and its last pose")
         self._board_is_new = False
         self.outcome.restarts += 1
@@ -291,12 +292,12 @@ class Streamer:
             self._put(start_from(self.outcome.poses[-1], self._is_inertial()))
 
     def _is_inertial(self) -> bool:
-        """Whether the board is moved by an IMU, by its settings in force."""
+        """Returns whether an IMU moves the board, by its settings in force."""
         config = self.outcome.config
         return config is not None and config.settings.get(IDS["process"]) == Process.IMU
 
     def _note(self, remark: str) -> None:
-        """The host's own word on what went wrong, for who reads the log."""
+        """Adds the host's own remark to the log."""
         self._keep(Text(remark, WARNING))
 
     def _keep(self, message: Message, heard: bool = False) -> None:
@@ -306,12 +307,12 @@ class Streamer:
 
 
 def is_restore(message: Message) -> bool:
-    """Whether a drive begins with it as with a START."""
+    """Returns whether a drive begins with this message as with a START."""
     return isinstance(message, State) and message.action == StateAction.RESTORE
 
 
 def start_from(pose: Pose, inertial: bool = False) -> Start:
-    """A START that goes on from a pose; with an IMU its velocity and biases go on too."""
+    """Returns a START that continues from a pose; with an IMU also from its velocity and biases."""
     start = Start(
         t_ns=pose.t_ns,
         R_WB=np.asarray(pose.R_WB),

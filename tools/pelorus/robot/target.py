@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `--to` names: qemu:BOARD, tcp:HOST:PORT or serial:DEVICE[:BAUD]."""
+"""Opens what `--to` names: qemu:BOARD, tcp:HOST:PORT or serial:DEVICE[:BAUD]."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pelorus.robot.emulator import Emulator, image_of
 from pelorus.robot.link import Link, LinkClosed
 
 BAUD = 921600
-LAST_WORDS_S = 2.0  # from an emulator's closing its sockets to its end
+LAST_WORDS_S = 2.0  # from an emulator's closing of its sockets to its end
 FORMS = "qemu:BOARD, tcp:HOST:PORT or serial:DEVICE[:BAUD]"
 
 
 @contextmanager
 def open_target(target: str, image: Path | None) -> Iterator[Link]:
-    """Connect to a target, for the block's length. `image` is the emulator's firmware."""
+    """Connects to a target for the duration of the block; `image` is the emulator's firmware."""
     scheme, _, rest = target.partition(":")
     if scheme == "qemu" and rest:
         with Emulator(rest, image or image_of(rest)) as emulator:

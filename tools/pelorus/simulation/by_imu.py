@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The drive of a body with an IMU: from the way to what stands in the recording."""
+"""Simulates a drive with an IMU, from the path to the recording."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from pelorus.recording import Recording
 from pelorus.simulation import imu as sensor
 from pelorus.simulation import smooth
 from pelorus.simulation.drive import Drive, exp
-from pelorus.simulation.imu import Imu, ImuFaults, Sensed, StartGiven
+from pelorus.simulation.imu import ImuFaults, Sensed, SimulatedImu, StartGiven
 
 
 class ImuDrive(NamedTuple):
-    """What of the options an IMU depends on."""
+    """The options on which an IMU depends."""
 
     way: smooth.Way
-    imu: Imu
+    imu: SimulatedImu
     faults: ImuFaults
     bias_gyro_sigma_radps: float
 
 
 class Chances(Protocol):
-    """Streams of chance by name."""
+    """Random generators by name."""
 
     def __getitem__(self, name: str) -> np.random.Generator: ...
 
 
 def drive_and_read(given: ImuDrive, t_ns: Times, chances: Chances) -> tuple[Drive, Sensed]:
-    """The motion at t_ns, and the readings over the same time."""
+    """Returns the motion at t_ns, and the readings over the same time."""
     own = given.imu.times(int(t_ns[-1]))
     times = np.union1d(t_ns, own)
     poses = smooth.poses(times, given.way)
@@ -56,10 +56,10 @@ def drive_and_read(given: ImuDrive, t_ns: Times, chances: Chances) -> tuple[Driv
 def driven(
     recording: Recording, given: ImuDrive, sensed: Sensed, chance: np.random.Generator
 ) -> Recording:
-    """The recording with an IMU's readings in place of twists."""
+    """Returns the recording with an IMU's readings instead of twists."""
     none: Floats = np.empty((0, 3))
     ahead_ns = round(given.faults.camera_offset_s * 1e9)
-    late_ns = max(ahead_ns, 0)  # of all but the frames: no time is negative
+    late_ns = max(ahead_ns, 0)  # of all but the frames, for no time may be negative
     recording = replace(
         recording,
         twist_t_ns=np.empty(0, np.int64),
@@ -80,13 +80,13 @@ def driven(
 
 
 def _biases(sensed: Sensed, t_ns: Times) -> Floats:
-    """(n, 6) at these times, in the order of START."""
+    """Returns (n, 6) biases at these times, in the order of START."""
     own = sensed.true._replace(a_B_mps2=sensed.bias_accel, w_B_radps=sensed.bias_gyro)
     return np.hstack(own.between(t_ns)[1:])
 
 
 def _noise(noise: Noise, given: ImuDrive) -> Noise:
-    """As it is; what there is none of is no suggestion."""
+    """Returns the noise; zero noise becomes no suggestion."""
     imu = given.imu
     told = {
         "gyro_noise": imu.gyro_noise,
@@ -105,9 +105,9 @@ def _noise(noise: Noise, given: ImuDrive) -> Noise:
 
 
 def _start(recording: Recording, given: ImuDrive, chance: np.random.Generator) -> Start | None:
-    """The first pose, with roll and pitch wrong by their sigma, and the velocity, by its own.
+    """Returns the first pose, with errors of roll, pitch and velocity by their sigmas.
 
-    Position and yaw are free, so they are as they are: nothing can be learnt of them.
+    Position and yaw are exact, for nothing can be learnt of them.
     """
     imu = given.imu
     if imu.start is StartGiven.NONE:
@@ -138,6 +138,6 @@ def _later(start: Start | None, by_ns: int) -> Start | None:
 
 
 def _turned(small: Floats) -> Floats:
-    """Exp of a small rotation of the world."""
+    """Returns Exp of a small rotation of the world."""
     R: Floats = exp(np.zeros((1, 3)), small[None]).R[0]
     return R

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the robot drives: twists by a smooth rule, poses by exact integration of them."""
+"""The robot's path: twists by a smooth rule, poses by their exact integration."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pelorus.simulation.settings import Span
 SERIES_TERMS = 9  # of the exponential map: exact to rounding up to 1 rad a step
 TURN_MAX_RAD = 1.0
 
-FIRST = Poses(  # a quarter turn left; not the origin: a mistaken world frame would show
+FIRST = Poses(  # a quarter turn left, off the origin: a wrong world frame would show
     np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([10.0, -5.0, 1.0])
 )
 
@@ -35,10 +35,10 @@ class Drive(NamedTuple):
 def drive(
     t_ns: Times, timing: TwistTiming, speed_mps: float, lap_s: float, stop: Span | None = None
 ) -> Drive:
-    """Laps of an uneven oval, rolling and pitching a little; in `stop` the body rests.
+    """Returns laps of an uneven oval, with a little roll and pitch; in `stop` the body rests.
 
-    The reading at t_j is what `timing` makes of it: the poses are the integral of the readings, to
-    rounding, so truth and twists agree exactly.
+    The reading at t_j depends on `timing`; the poses are the integral of the readings, so truth and
+    twists agree up to rounding.
     """
     v, w = profile(t_ns, speed_mps, lap_s)
     if stop is not None:
@@ -50,19 +50,19 @@ def drive(
 
 
 def stood(t_ns: Times) -> Drive:
-    """At the first pose for ever."""
+    """Returns a drive that stays at the first pose."""
     still: Floats = np.zeros((len(t_ns), 3))
     R = np.broadcast_to(FIRST.R, (len(t_ns), 3, 3))
     return Drive(t_ns, still, still, Poses(R, np.broadcast_to(FIRST.p, still.shape)))
 
 
 def profile(t_ns: Times, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
-    """Linear and angular velocity (n, 3) in a forward-left-up body."""
+    """Returns linear and angular velocity (n, 3) in a forward-left-up body."""
     return profile_at(np.asarray(t_ns * 1e-9, np.float64), speed_mps, lap_s)
 
 
 def profile_at(t: Floats, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
-    """The same at times in seconds."""
+    """Returns the same at times in seconds."""
     lap_rate = 6.283185307179586 / lap_s
     v = np.stack(
         (
@@ -80,7 +80,7 @@ def profile_at(t: Floats, speed_mps: float, lap_s: float) -> tuple[Floats, Float
 
 
 def profile_slope(t: Floats, speed_mps: float) -> Floats:
-    """The derivative of the linear velocity (n, 3)."""
+    """Returns the derivative of the linear velocity (n, 3)."""
     return np.stack(
         (
             0.2 / 17.0 * speed_mps * wave_slope(t / 17.0),
@@ -92,20 +92,20 @@ def profile_slope(t: Floats, speed_mps: float) -> Floats:
 
 
 def wave(x: Floats) -> Floats:
-    """A sine's likeness of period 1 and amplitude 1, from parabolas."""
+    """Returns an approximate sine of period 1 and amplitude 1, from parabolas."""
     x = x - np.floor(x)
     half = x < 0.5
     return np.where(half, 16 * x * (0.5 - x), -16 * (x - 0.5) * (1 - x))
 
 
 def wave_slope(x: Floats) -> Floats:
-    """The derivative of `wave`, which is continuous."""
+    """Returns the derivative of `wave`, which is continuous."""
     x = x - np.floor(x)
     return np.where(x < 0.5, 8 - 32 * x, 32 * x - 24)
 
 
 def exp(rho: Floats, theta: Floats) -> Poses:
-    """Exp of SE(3) by its power series, (n, 3) and (n, 3)."""
+    """Returns Exp of SE(3) by its power series, of (n, 3) and (n, 3)."""
     s = theta[:, 0] ** 2 + theta[:, 1] ** 2 + theta[:, 2] ** 2
     if len(s) and s.max() > TURN_MAX_RAD**2:
         raise ValueError(f"a step of {np.sqrt(s.max()):.2f} rad, at most {TURN_MAX_RAD} are exact")
@@ -121,7 +121,7 @@ def exp(rho: Floats, theta: Floats) -> Poses:
 
 
 def rotate(R: Floats, x: Floats) -> Floats:
-    """R x for stacks, in a fixed order of operations."""
+    """Returns R x for stacks, in a fixed order of operations."""
     return (
         R[..., :, 0] * x[..., None, 0]
         + R[..., :, 1] * x[..., None, 1]

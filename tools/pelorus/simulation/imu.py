@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An IMU on the simulated drive: what it reads, and what goes wrong with it."""
+"""Simulates an IMU: its readings and its faults."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ DEGREES = 57.29577951308232  # of a radian
 
 
 class StartGiven(StrEnum):
-    """What a START knows."""
+    """What a START contains."""
 
     VELOCITY = "velocity"
     POSE = "pose"
@@ -41,8 +41,8 @@ class StartGiven(StrEnum):
 
 
 @dataclass(frozen=True)
-class Imu:
-    """An IMU in place of twists. Noises as Kalibr and data sheets give them."""
+class SimulatedImu:
+    """An IMU instead of twists. Noises are as in Kalibr and data sheets."""
 
     imu_rate_hz: float = setting(
         0.0, "Write the readings of an IMU in place of twists; 0: twists.", "HZ", RATES
@@ -83,7 +83,7 @@ class Imu:
         return self.imu_rate_hz > 0
 
     def times(self, until_ns: int) -> Times:
-        """Of its readings, up to the first one at or behind the end."""
+        """Returns the times of its readings, up to the first one at or after the end."""
         period = 1e9 / self.imu_rate_hz
         count = int(np.ceil(until_ns / period)) + 1
         return np.round(np.arange(count) * period).astype(np.int64)
@@ -91,7 +91,7 @@ class Imu:
 
 @dataclass(frozen=True)
 class ImuFaults:
-    """What goes wrong with an IMU. Without them nothing does."""
+    """Faults of an IMU; by default there are none."""
 
     accel_vibration_mps2: float = setting(
         0.0, "A motor shakes the accelerometer, all axes, by this amplitude.", "M/S^2"
@@ -130,8 +130,8 @@ class ImuFaults:
         "x,y,z", "What stands where x, y and z should, for example y,-x,z.", "X,Y,Z", None
     )
 
-    def check(self, imu: Imu) -> None:
-        """Refuse what makes no sense, by the option's name."""
+    def check(self, imu: SimulatedImu) -> None:
+        """Refuses contradictory options, by the option's name."""
         settings.check(self)
         for part in (imu, self):
             given = next((f.name for f in fields(part) if getattr(part, f.name) != f.default), "")
@@ -139,24 +139,24 @@ class ImuFaults:
             require(given, getattr(part, given, None), good, "--imu-rate beside it")
         parts = [part.strip() for part in self.imu_axes.split(",")]
         sound = sorted(part.removeprefix("-") for part in parts) == list(AXES)
-        due = "x, y and z in some order, with or without -, parted by commas,"
-        require("imu_axes", self.imu_axes, sound, due)
+        expected = "x, y and z in some order, with or without -, parted by commas,"
+        require("imu_axes", self.imu_axes, sound, expected)
 
     @property
     def mounting(self) -> Floats:
-        """(3, 3): the numbers of the true axes -> what is told as x, y, z."""
+        """Returns (3, 3) that maps the true axes to the reported x, y, z."""
         out = np.zeros((3, 3))
         for row, part in enumerate(part.strip() for part in self.imu_axes.split(",")):
             out[row, AXES.index(part[-1])] = -1.0 if part.startswith("-") else 1.0
         return out
 
 
-NO_IMU = Imu()
+NO_IMU = SimulatedImu()
 NO_FAULTS = ImuFaults()
 
 
 class Sensed(NamedTuple):
-    """The readings as they are told, and the true biases at all of the IMU's times."""
+    """The readings as reported, and the true biases at all of the IMU's times."""
 
     readings: Inertial
     true: Inertial  # at all of the IMU's times, without noise and bias
@@ -165,14 +165,14 @@ class Sensed(NamedTuple):
 
 
 def read(
-    imu: Imu,
+    imu: SimulatedImu,
     faults: ImuFaults,
     bias_gyro_sigma: float,
     true: Inertial,
     chance: np.random.Generator,
     bad: np.random.Generator,
 ) -> Sensed:
-    """What the IMU makes of the true motion at its own times: noise and biases, then faults."""
+    """Returns the readings of the true motion at the IMU's times: noise and biases, then faults."""
     tau = np.diff(true.t_ns) * 1e-9
     count = len(true.t_ns)
     b_a = sensors.biases(imu.bias_accel_sigma_mps2, imu.accel_walk * imu.accel_walk, tau, chance)
@@ -226,7 +226,7 @@ def _no_numbers(
 def _one_number(
     share: float, count: int, bad: np.random.Generator
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-    """Which readings are hit, and which of their six numbers."""
+    """Returns which readings are hit, and which of their six numbers."""
     return bad.random(count) < share, bad.integers(0, 6, count)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What goes wrong on a drive: with the wheels, the camera, the scene, the calibration.
+"""Simulates mishaps of a drive: of wheels, camera, scene and calibration.
 
-Each mishap leaves the rest of the drive as it was, to the bit: chance has a stream of its own. As
-in all of the simulation, only sums, products, quotients and square roots are used.
+Each mishap leaves the rest of the drive as it was, to the bit, for each has a random generator of
+its own. As in all of the simulation, only sums, products, quotients and square roots are used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Mishaps:
-    """Without them nothing goes wrong."""
+    """The mishaps of a drive; by default there are none."""
 
     twist_delay_s: float = setting(
         0.0, "Twists stand so much later in the file than their time: behind newer frames.", "S"
@@ -79,40 +79,40 @@ class Mishaps:
     )
 
     def check(self) -> None:
-        """Refuse what makes no sense, by the option's name."""
+        """Refuses contradictory options, by the option's name."""
         settings.check(self)
         going = bool(self.moving_speed_mps or self.convoy)
-        due = "--moving-speed or --convoy, which say how they move"
-        require("moving", self.moving, going or not self.moving, due)
+        expected = "--moving-speed or --convoy, which say how they move"
+        require("moving", self.moving, going or not self.moving, expected)
         require("moving", self.moving, bool(self.moving) or not going, "the share that moves")
 
     def check_beside(self, an_imu: bool) -> None:
-        """Those of wheels make no sense without wheels."""
+        """Refuses mishaps of wheels where there are none."""
         for name in ("slip", "dead_encoder", "twist_delay_s"):
             given = getattr(self, name)
             usual = given == getattr(NO_MISHAPS, name)
             require(name, given, usual or not an_imu, "twists, so no --imu-rate beside it,")
 
-    def true_camera(self, told: Camera) -> Camera:
-        """The camera that makes the images, where the HEADER tells of another."""
+    def true_camera(self, given: Camera) -> Camera:
+        """Returns the camera that makes the images, given the HEADER's."""
         focal = 1 + self.focal_error_percent / 100
         return replace(
-            told,
-            fx_px=focal * told.fx_px,
-            fy_px=focal * told.fy_px,
-            baseline_m=(1 + self.baseline_error_percent / 100) * told.baseline_m,
+            given,
+            fx_px=focal * given.fx_px,
+            fy_px=focal * given.fy_px,
+            baseline_m=(1 + self.baseline_error_percent / 100) * given.baseline_m,
         )
 
-    def true_extrinsic(self, told: Poses) -> Poses:
-        """T_CB of the camera that makes the images: turned about its own middle."""
+    def true_extrinsic(self, given: Poses) -> Poses:
+        """Returns T_CB of the camera that makes the images: turned about its own centre."""
         if not self.camera_turned_deg:
-            return told
+            return given
         about_each = np.radians(self.camera_turned_deg) / np.sqrt(3.0)
         turn = exp(np.zeros((1, 3)), np.full((1, 3), about_each)).R[0]
-        return Poses(rotate(turn, told.R.T).T, rotate(turn, told.p))
+        return Poses(rotate(turn, given.R.T).T, rotate(turn, given.p))
 
     def readings(self, t_ns: Times, v: Floats, w: Floats) -> tuple[Floats, Floats]:
-        """What the recording has of the twists."""
+        """Returns the recorded twists."""
         factor = np.where(self.slip_span.holds(t_ns), self.slip, 1.0)[:, None]
         v, w = v * factor, w * factor
         if self.dead_encoder is not None:
@@ -120,7 +120,7 @@ class Mishaps:
         return v, w
 
     def jumped(self, t_ns: Times, poses: Poses) -> Poses:
-        """From `jump_at_s` on the body stands aside, to its left of that time."""
+        """Returns poses that jump to the left at `jump_at_s`."""
         after = np.nonzero(t_ns * 1e-9 >= self.jump_at_s)[0]
         if not self.jump_m or not len(after):
             return poses
@@ -130,7 +130,7 @@ class Mishaps:
         return Poses(poses.R, p)
 
     def ways(self, t_ns: Times, poses: Poses, chance: np.random.Generator) -> Floats:
-        """(frames, 3): how far each moving landmark has come, in the world."""
+        """Returns (frames, 3) how far each moving landmark has come, in the world."""
         x, y = chance.uniform(-1.0, 1.0, 2)
         heading = np.array([x, y, 0.0]) / np.sqrt(x * x + y * y)
         holds = self.moving_span.holds(t_ns[:-1])[:, None]
@@ -142,7 +142,10 @@ class Mishaps:
         return out
 
     def freeze(self, frame_t_ns: Times, tracks: Tracks) -> tuple[Tracks, NDArray[np.intp]]:
-        """While the camera is frozen every frame is the last one before; and which row is whose."""
+        """Returns the tracks with frames that repeat the last one while the camera is frozen.
+
+        Also returns which row each comes from.
+        """
         bounds = tracks.bounds()
         rows = [np.arange(bounds[k], bounds[k + 1]) for k in range(tracks.frame_count)]
         if self.frozen is not None:
@@ -158,8 +161,8 @@ class Mishaps:
 NO_MISHAPS = Mishaps()
 
 
-class Drift:
-    """How far each track has wandered: a random walk, in both images alike."""
+class TrackDrift:
+    """Drift of each track: a random walk, alike in both images."""
 
     def __init__(self, count: int, sigma: float, chance: np.random.Generator) -> None:
         self._sigma = sigma
@@ -168,7 +171,7 @@ class Drift:
         self._id = np.full(count, -1, np.int64)
 
     def wander(self, landmarks: NDArray[np.intp], ids: NDArray[np.int64], tau_s: float) -> Floats:
-        """(n, 4) px to be added to uL vL uR vR of this frame's landmarks."""
+        """Returns (n, 4) px to add to uL vL uR vR of this frame's landmarks."""
         if not self._sigma:
             return np.zeros((len(landmarks), 4))
         steps = self._sigma * np.sqrt(tau_s) * self._chance.standard_normal(self._offset.shape)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the small sensors read on a drive: noise as the filter reckons with, losses, outliers."""
+"""Simulates readings of small sensors: noise as the filter assumes it, losses, outliers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pelorus.simulation import settings
 from pelorus.simulation.settings import BELOW_ONE, NOT_NEGATIVE, Numbers, require, setting
 from pelorus.small_sensors import Motion, SmallSensor
 
-OUTLIER_SIGMAS = 100.0  # an outlier is off by up to so much
-HELD_INTERVALS = 2  # the filter holds a velocity for so many intervals if the next does not come
+OUTLIER_SIGMAS = 100.0  # largest error of an outlier
+HELD_INTERVALS = 2  # intervals for which the filter holds a velocity if the next does not come
 
 
 @dataclass(frozen=True)
 class Sensing:
-    """How one small sensor measures. What is empty is as the table of sensors has it."""
+    """How one small sensor measures; empty fields have the defaults of the table of sensors."""
 
     rate_hz: float = setting(
         0.0, "Its readings, of which the twist rate is a whole multiple; 0: none.", "HZ"
@@ -38,7 +38,7 @@ class Sensing:
     )
 
     def check(self, sensor: SmallSensor, twist_rate_hz: float) -> None:
-        """Refuse what makes no sense, by the option's name."""
+        """Refuses contradictory options, by the option's name."""
         settings.check(self, f"{sensor.name}_")
         name = sensor.name
         if not self.rate_hz:
@@ -47,15 +47,15 @@ class Sensing:
             require(f"{name}_{first}", given, not first, f"--{name}-rate beside it")
             return
         ratio = twist_rate_hz / self.rate_hz
-        due = f"a whole part of the twist rate, {twist_rate_hz:g},"
-        require(f"{name}_rate_hz", self.rate_hz, round(ratio) == ratio >= 1, due)
+        expected = f"a whole part of the twist rate, {twist_rate_hz:g},"
+        require(f"{name}_rate_hz", self.rate_hz, round(ratio) == ratio >= 1, expected)
         letters = self.letters_of(sensor)
         good = len(set(letters)) == len(letters) and set(letters) <= set(sensor.letters)
         require(f"{name}_axes", self.axes, good, f"some of the letters {sensor.letters}")
         count = len(sensor.columns)
         sound = all(NOT_NEGATIVE.holds(x) and x > 0 for x in self.sigma)
-        due = f"one positive number, or {count} parted by commas,"
-        require(f"{name}_sigma", self.sigma, sound and len(self.sigma) in (0, 1, count), due)
+        expected = f"one positive number, or {count} parted by commas,"
+        require(f"{name}_sigma", self.sigma, sound and len(self.sigma) in (0, 1, count), expected)
         sound = all(map(math.isfinite, self.at_m)) and len(self.at_m) in (0, 3)
         require(f"{name}_at_m", self.at_m, sound, "three numbers of metres, parted by commas,")
 
@@ -63,12 +63,12 @@ class Sensing:
         return self.axes or sensor.usual or sensor.letters
 
     def sigma_of(self, sensor: SmallSensor) -> Floats:
-        """Of each of its numbers."""
+        """Returns the sigma of each of its numbers."""
         return np.broadcast_to(np.array(self.sigma or sensor.sigma), (len(sensor.columns),))
 
 
 def options_without_meaning(sensor: SmallSensor) -> set[str]:
-    """Fields of Sensing that nothing of this sensor depends on."""
+    """Returns the fields of Sensing that this sensor ignores."""
     without = set() if sensor.has_arm else {"at_m"}
     return without | ({"outliers"} if sensor.at_rest else set())
 
@@ -81,7 +81,7 @@ def read(
     every: int,
     chance: np.random.Generator,
 ) -> list[Reading]:
-    """Its readings at each `every`-th time, but for the first: before it there is no pose yet."""
+    """Returns readings at each `every`-th time but the first: before it there is no pose yet."""
     rows = np.arange(every, len(t_ns), every)
     if sensor.at_rest:
         rows = rows[_stays_at_rest(motion, every)[rows]]
@@ -111,7 +111,10 @@ def read(
 
 
 def _stays_at_rest(motion: Motion, every: int) -> NDArray[np.bool_]:
-    """At rest, and for as long as the filter holds the reading: who drives off knows before."""
+    """Returns where the body rests, and does so for as long as the filter holds the reading.
+
+    A robot that sets off knows it before.
+    """
     moves = np.concatenate((motion.v_B_mps, motion.w_B_radps), axis=1)
     rests: NDArray[np.bool_] = (moves == 0).all(axis=1)
     ahead = np.concatenate((rests, np.repeat(rests[-1:], HELD_INTERVALS * every - 1)))

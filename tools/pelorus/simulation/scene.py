@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What there is to see: landmarks along the way, and the camera that sees them."""
+"""The scene: landmarks along the path, and the camera that sees them."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from pelorus.simulation.drive import rotate
 CAMERA = Camera(fx_px=420.0, fy_px=420.0, cx_px=320.0, cy_px=240.0, baseline_m=0.2)
 IMAGE_PX = (640, 480)
 R_CB = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])  # body forward-left-up
-CAMERA_IN_BODY_M = np.array([1.0, 0.3, 0.6])  # a car's: turns move the camera sideways
+CAMERA_IN_BODY_M = np.array([1.0, 0.3, 0.6])  # of a car: turns move the camera sideways
 T_CB = Poses(R_CB, -rotate(R_CB, CAMERA_IN_BODY_M))
 
 DEPTH_MIN_M = 0.8
-SIDE_M = (3.0, 15.0)  # distance of landmarks from the way, on either side
+SIDE_M = (3.0, 15.0)  # distance of landmarks from the path, on either side
 HEIGHT_M = (-1.0, 5.0)
 
 
 class View(NamedTuple):
-    """Landmarks in the left camera (m, 3) and in the images (m, 4), and which can be seen."""
+    """Landmarks in the left camera (m, 3) and in the images (m, 4), and which are visible."""
 
     q_C: Floats
     pixels: Floats
@@ -33,14 +33,14 @@ class View(NamedTuple):
 
 
 class Depths(NamedTuple):
-    """Landmarks are seen between these depths; 0: as the camera and its range allow."""
+    """Limits of the landmarks' depth; 0: as camera and range allow."""
 
     least_m: float = 0.0
     most_m: float = 0.0
 
     @property
     def side_m(self) -> tuple[float, float]:
-        """How far beside the way they stand, so that there are some at these depths."""
+        """Returns how far beside the path they stand, so that there are some at these depths."""
         return (self.least_m or SIDE_M[0], self.most_m or max(SIDE_M[1], 2 * self.least_m))
 
     @property
@@ -54,7 +54,7 @@ ANY_DEPTH = Depths()
 def landmarks(
     path: Poses, count: int, chance: np.random.Generator, depths: Depths = ANY_DEPTH
 ) -> Floats:
-    """(count, 3) in the world, beside random poses of the path."""
+    """Returns (count, 3) landmarks in the world, beside random poses of the path."""
     at = chance.integers(0, len(path.p), count)
     side = chance.uniform(*depths.side_m, count) * chance.choice((-1.0, 1.0), count)
     ahead = chance.uniform(-3.0, 3.0, count)
@@ -71,7 +71,7 @@ def view(
     depths: Depths = ANY_DEPTH,
     extrinsic: Poses = T_CB,
 ) -> View:
-    """What the camera of a body at (R, p) sees of the points."""
+    """Returns the points in the camera of a body at (R, p)."""
     in_body = rotate(R_WB.T, points_W - p_WB)
     q = rotate(extrinsic.R, in_body) + extrinsic.p
     x, y, z = q.T

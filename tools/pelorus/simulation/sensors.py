@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the robot measures of the drive and the scene: noise, biases, tracks, bad matches."""
+"""Simulates the robot's measurements: noise, biases, tracks, bad matches."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ OUTLIER_DISPARITY_MAX_PX = 60.0
 
 
 def biases(sigma: float, walk: float, tau_s: Floats, chance: np.random.Generator) -> Floats:
-    """(n, 3): drawn once, then a random walk with `walk` (unit^2/s) of variance a second."""
+    """Returns (n, 3) biases: drawn once, then a random walk of `walk` (unit^2/s)."""
     first = sigma * chance.standard_normal(3)
     steps = np.sqrt(walk * tau_s)[:, None] * chance.standard_normal((len(tau_s), 3))
     out = np.empty((len(tau_s) + 1, 3))
     out[0] = first
-    for k, step in enumerate(steps):  # cumsum's order of operations is numpy's own business
+    for k, step in enumerate(steps):  # cumsum's order of operations is not specified
         out[k + 1] = out[k] + step
     return out
 
 
 def white(sigma: float, count: int, chance: np.random.Generator) -> Floats:
-    """(count, 3) independent readings' noise."""
+    """Returns (count, 3) independent noise."""
     return sigma * chance.standard_normal((count, 3))
 
 
 @dataclass
-class Tracker:
+class SimulatedTracker:
     """Gives landmarks ids: kept while one is seen without a break, a new one afterwards.
 
-    With `keep_ids` a landmark has one id for ever (its number), so loops close.
+    With `keep_ids` a landmark has one permanent id (its number), so loops close.
     """
 
     count: int  # landmarks of the scene
-    most: int  # observations of a frame
+    most: int  # observations of a frame at most
     loss: float  # probability a frame that a track breaks
     keep_ids: bool
     chance: np.random.Generator
@@ -48,7 +48,7 @@ class Tracker:
         self._next = 0
 
     def follow(self, visible: NDArray[np.bool_]) -> NDArray[np.intp]:
-        """The landmarks of this frame, ascending; `ids` gives theirs."""
+        """Returns the landmarks of this frame, ascending; `ids` has theirs."""
         lost = self.chance.random(self.count) < self.loss
         preference = self.chance.random(self.count)
         tracked = (self._id >= 0) & visible & ~lost
@@ -72,7 +72,7 @@ def measure(
     chance: np.random.Generator,
     bad: np.random.Generator,
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Pixels (n, 4) with independent noise, and which of them are another point's."""
+    """Returns pixels (n, 4) with independent noise, and which of them are wrong matches."""
     count = len(landmarks)
     noise = pixel_sigma * chance.standard_normal((count, 4))
     wrong = bad.random(count) < outliers

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Settings of the simulation: fields of a dataclass that say what they are, once.
+"""Settings of the simulation: fields of a dataclass that describe themselves.
 
 A field's help, unit and limits stand beside its default. The command makes its options from them,
 and `check` refuses what is beyond the limits.
@@ -32,14 +32,14 @@ UNITS = (
 )  # an option's name has no unit
 
 
-Numbers = tuple[float, ...]  # an option of several, parted by commas
+Numbers = tuple[float, ...]  # an option of several numbers, separated by commas
 
 
 class Rule(NamedTuple):
-    """What a number must be: as a test, and in words."""
+    """A limit of a number: as a test, and in words."""
 
     holds: Callable[[float], bool]
-    due: str
+    expected: str
 
 
 POSITIVE = Rule(lambda x: 0 < x < math.inf, "a positive number")
@@ -53,8 +53,8 @@ DEGREES = Rule(lambda x: -20 <= x <= 20, "a number of degrees from -20 to 20")
 TIME = Rule(lambda x: 0 <= x < math.inf, "a number of seconds, not negative")
 
 
-class Setting(NamedTuple):
-    """What a field tells of itself."""
+class OptionField(NamedTuple):
+    """The description of a field."""
 
     help: str
     unit: str | None
@@ -63,7 +63,7 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class Span:
-    """A part of the drive: from a time on, for so long; 0: to the end."""
+    """A part of the drive: its beginning and its length; 0: to the end."""
 
     from_s: float = 0.0
     for_s: float = 0.0
@@ -77,38 +77,40 @@ class Span:
 def setting(
     default: Any, help: str, unit: str | None = None, rule: Rule | None = NOT_NEGATIVE
 ) -> Any:
-    """A field that can be chosen on the command line. A Span becomes two options, -from and -for;
-    without a default of its own its mishap does not happen unless its beginning is given.
+    """Declares a field that can be chosen on the command line.
+
+    A Span becomes two options, -from and -for; without a default of its own its mishap does not
+    happen unless its beginning is given.
     """
-    return field(default=default, metadata={"setting": Setting(help, unit, rule)})
+    return field(default=default, metadata={"setting": OptionField(help, unit, rule)})
 
 
-def settings_of(given: Any) -> dict[str, Setting]:
-    """By the field's name, of a dataclass or one of its instances."""
+def settings_of(given: Any) -> dict[str, OptionField]:
+    """Returns the settings of a dataclass or its instance, by the field's name."""
     return {f.name: f.metadata["setting"] for f in fields(given) if "setting" in f.metadata}
 
 
 def option_name(name: str) -> str:
-    """The option of a field: duration_s is --duration, slip_span --slip-from and --slip-for."""
+    """Returns the option of a field: duration_s is --duration, slip_span --slip-from, -for."""
     for unit in (*UNITS, "_span"):
         name = name.removesuffix(unit)
     return "--" + name.replace("_", "-")
 
 
-def require(name: str, value: object, good: bool, due: str) -> None:
-    """Refuse a value by its option's name."""
+def require(name: str, value: object, good: bool, expected: str) -> None:
+    """Refuses a value by its option's name, unless it is good."""
     if not good:
         shown = ",".join(f"{x:g}" for x in value) if isinstance(value, tuple) else value
-        raise PelorusError(f"{option_name(name)} is {shown}: {due} is expected")
+        raise PelorusError(f"{option_name(name)} is {shown}: {expected} is expected")
 
 
 def check(given: Any, prefix: str = "") -> None:
-    """Refuse the first field that is beyond its limits; options' names begin with the prefix."""
+    """Refuses the first field that is beyond its limits; options' names begin with the prefix."""
     for name, about in settings_of(given).items():
         value = getattr(given, name)
         if isinstance(value, Span):
             for end, time_s in (("from", value.from_s), ("for", value.for_s)):
                 stem = name.removesuffix("_span")
-                require(f"{stem}_{end}", time_s, TIME.holds(time_s), TIME.due)
+                require(f"{stem}_{end}", time_s, TIME.holds(time_s), TIME.expected)
         elif about.rule is not None and value is not None:
-            require(prefix + name, value, about.rule.holds(value), about.rule.due)
+            require(prefix + name, value, about.rule.holds(value), about.rule.expected)

@@ -29,8 +29,8 @@ from pelorus.se3 import Poses
 from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.simulation import by_imu, scene, sensors, settings, smooth
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, exp, rotate, stood
-from pelorus.simulation.imu import NO_FAULTS, NO_IMU, Imu, ImuFaults, Sensed
-from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
+from pelorus.simulation.imu import NO_FAULTS, NO_IMU, ImuFaults, Sensed, SimulatedImu
+from pelorus.simulation.mishaps import NO_MISHAPS, Flags, Mishaps, TrackDrift
 from pelorus.simulation.readings import Sensing, read
 from pelorus.simulation.settings import (
     AT_LEAST_ONE,
@@ -50,7 +50,7 @@ PEAK_TURN = 1.7  # the peak of the turn rate over its mean, and some roll and pi
 
 @dataclass(frozen=True)
 class Options:
-    """What can be chosen of a drive."""
+    """The options of a drive."""
 
     seed: int = setting(
         1,
@@ -113,11 +113,11 @@ class Options:
     stop: Span | None = setting(None, "From then on the robot rests.")
     mishaps: Mishaps = NO_MISHAPS
     readings: Mapping[str, Sensing] = field(default_factory=dict)  # of small sensors, by name
-    imu: Imu = NO_IMU
+    imu: SimulatedImu = NO_IMU
     imu_faults: ImuFaults = NO_FAULTS
 
     def check(self) -> None:
-        """Refuse what makes no sense, by the option's name."""
+        """Refuses contradictory options, by the option's name."""
         settings.check(self)
         settings.check(self.imu)
         deeper = not self.max_depth_m or self.max_depth_m > self.min_depth_m
@@ -129,19 +129,19 @@ class Options:
             self.readings[sensor.name].check(sensor, self.twist_rate_hz)
         ratio = self.twist_rate_hz / self.frame_rate_hz
         whole = round(ratio) == ratio >= 1
-        due = "a whole multiple of the frame rate"
-        require("twist_rate_hz", self.twist_rate_hz, whole, due)
+        expected = "a whole multiple of the frame rate"
+        require("twist_rate_hz", self.twist_rate_hz, whole, expected)
         short = self.frames <= FRAMES_MAX
         require("duration_s", self.duration_s, short, f"at most {FRAMES_MAX} frames")
         within = self.frame_lead_ns * self.twist_rate_hz < 1e9
         require("frame_lead_ns", self.frame_lead_ns, within, "less than from one twist to the next")
         turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
-        due = f"at most {TURN_MAX_RAD} rad a twist"
-        require("lap_s", self.lap_s, turn < TURN_MAX_RAD, due)
+        expected = f"at most {TURN_MAX_RAD} rad a twist"
+        require("lap_s", self.lap_s, turn < TURN_MAX_RAD, expected)
 
     @property
     def small_sensors(self) -> list[SmallSensor]:
-        """Of which anything is told."""
+        """Returns the small sensors that have options."""
         return [sensor for sensor in SMALL_SENSORS if sensor.name in self.readings]
 
     @property
@@ -150,13 +150,13 @@ class Options:
 
     @property
     def seen_m(self) -> float:
-        """How far is seen: the depths that are asked for are not cut off."""
+        """Returns the camera's range; the chosen depths are not cut off."""
         deepest = self.depths.side_m[1] if self.depths.given else 0.0
         return max(self.range_m, 2 * deepest)
 
     @property
     def way(self) -> smooth.Way:
-        """Of a body with an IMU, which needs accelerations."""
+        """Returns the path of a body with an IMU, which needs accelerations."""
         return smooth.Way(self.speed_mps, self.lap_s, self.imu.rest_s, self.stop, self.parked)
 
     @property
@@ -165,7 +165,7 @@ class Options:
 
     @property
     def camera(self) -> Camera:
-        """As the HEADER tells it."""
+        """Returns the HEADER's camera."""
         return replace(scene.CAMERA, baseline_m=self.baseline_m)
 
     @property
@@ -178,12 +178,12 @@ class Options:
 
     @property
     def lookahead_s(self) -> float:
-        """So far beyond its end the drive must have landmarks, for there it looks."""
+        """Returns how far beyond the drive's end landmarks are needed: the camera looks ahead."""
         return min(self.range_m / self.speed_mps, self.lap_s) if self.speed_mps else 0.0
 
 
 class _Chances:
-    """An independent stream for each source of chance: changing one option leaves the others."""
+    """An independent random generator for each source: changing one option leaves the others."""
 
     def __init__(self, seed: int) -> None:
         names = ("scene", "tracker", "pixels", "outliers", "drops", "velocity", "gyro", "bias_v")
@@ -210,7 +210,7 @@ class Simulation:
 
 
 def simulate(options: Options) -> Simulation:
-    """Drive, look, and measure."""
+    """Simulates a drive: motion, scene and measurements."""
     options.check()
     chances = _Chances(options.seed)
     points = _landmarks(options, chances)
@@ -246,14 +246,17 @@ def simulate(options: Options) -> Simulation:
 
 
 def _exact_camera(options: Options) -> dict[str, float]:
-    """No simulated camera is off by what a calibration leaves, unless that is asked for."""
+    """Returns the settings of an exact calibration, unless errors of it are asked for."""
     mishaps = options.mishaps
     off = mishaps.focal_error_percent or mishaps.baseline_error_percent or mishaps.camera_turned_deg
     return {} if off else dict.fromkeys(CALIBRATION_SIGMAS, 0.0)
 
 
 def _landmarks(options: Options, chances: _Chances) -> Floats:
-    """Beside the way, and beyond its end. A parked body sees those of the way that it could go."""
+    """Returns landmarks beside the path and beyond its end.
+
+    A parked body sees those of the path on which it could drive.
+    """
     t_ns = _node_times(options, options.lookahead_s)
     if options.imu.is_there:
         poses = smooth.poses(t_ns, options.way._replace(parked=False))
@@ -263,7 +266,7 @@ def _landmarks(options: Options, chances: _Chances) -> Floats:
 
 
 def _way(options: Options, t_ns: Times) -> Drive:
-    """By twists."""
+    """Returns the drive by twists."""
     if options.parked:
         return stood(t_ns)
     timing, speed, lap = options.twist_timing, options.speed_mps, options.lap_s
@@ -271,9 +274,10 @@ def _way(options: Options, t_ns: Times) -> Drive:
 
 
 def _led(options: Options, way: Drive, nodes: Indices) -> Poses:
-    """The poses at these nodes, but for the first one, as much before them as frames are: along the
-    twist that holds there. Of an IMU's way that is the rate at the node, which over 1 ms is true to
-    some micrometres.
+    """Returns the poses at these nodes but the first, moved ahead to the frames' times.
+
+    They follow the twist that holds there; by an IMU the rate at the node, which over 1 ms is exact
+    to micrometres.
     """
     poses = way.poses.at(nodes)
     if not options.frame_lead_ns:
@@ -288,7 +292,7 @@ def _led(options: Options, way: Drive, nodes: Indices) -> Poses:
 
 
 def blindness(recording: Recording) -> str:
-    """What is to be told of frames in which nothing is seen; nothing if there are none."""
+    """Returns a remark on frames in which nothing is seen; empty if there are none."""
     frames = len(recording.frame_t_ns)
     blind = int((recording.tracks.counts() == 0).sum())
     if not blind:
@@ -340,7 +344,7 @@ def _small_readings(options: Options, way: Drive, chances: _Chances) -> list[Rea
 def _observe(
     options: Options, t_ns: Times, poses: Poses, points: Floats, chances: _Chances
 ) -> tuple[Tracks, Flags]:
-    tracker = sensors.Tracker(
+    tracker = sensors.SimulatedTracker(
         options.landmarks,
         options.observations,
         options.loss,
@@ -374,7 +378,7 @@ def _observe(
 
 
 class _Eye:
-    """The true camera, and where the landmarks are meanwhile."""
+    """The true camera, and the landmarks' places over time."""
 
     def __init__(
         self, options: Options, t_ns: Times, poses: Poses, points: Floats, chances: _Chances
@@ -388,7 +392,7 @@ class _Eye:
         moves = chances["moving"].random(len(points)) < mishaps.moving
         self._moves = moves[:, None]
         self._ways = mishaps.ways(t_ns, poses, chances["moving_ways"])
-        self._drift = Drift(len(points), mishaps.track_drift, chances["drift"])
+        self._drift = TrackDrift(len(points), mishaps.track_drift, chances["drift"])
         self._tau_s = np.diff(t_ns, prepend=t_ns[:1]) * 1e-9
 
     def look(self, k: int) -> scene.View:
@@ -403,7 +407,7 @@ class _Eye:
 
 
 def _header(options: Options) -> Header:
-    """The noise as it is; what there is none of is no suggestion."""
+    """Returns the HEADER; zero noise becomes no suggestion."""
     suggested = {name: getattr(options, name, -1.0) for name in vars(Noise())}
     width, height = scene.IMAGE_PX
     return Header(

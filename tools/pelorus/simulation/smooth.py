@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A drive that has accelerations: the velocities of `drive.profile`, with ramps where it rests.
+"""A drive with accelerations: the velocities of `drive.profile`, with ramps where it rests.
 
 Velocities and their derivatives are exact at any time; poses are their integral by two evaluations
 a step and the commutator of these (Magnus, fourth order), exact to 1e-9 m at 100 steps a second. As
@@ -20,11 +20,11 @@ from pelorus.simulation.drive import rotate
 from pelorus.simulation.settings import Span
 
 RAMP_S = 2.0  # from rest to full speed
-GAUSS = 0.28867513459481287  # sqrt(3) / 6: from the middle of a step to where it is evaluated
+GAUSS = 0.28867513459481287  # sqrt(3) / 6: from the middle of a step to its evaluations
 
 
 class Way(NamedTuple):
-    """How fast the body goes, as a function of time."""
+    """The body's velocity as a function of time."""
 
     speed_mps: float
     lap_s: float
@@ -33,19 +33,19 @@ class Way(NamedTuple):
     parked: bool = False
 
     def velocities(self, t_s: Floats) -> tuple[Floats, Floats]:
-        """v and w (n, 3) in body axes."""
+        """Returns v and w (n, 3) in body axes."""
         v, w = drive.profile_at(t_s, self.speed_mps, self.lap_s)
         share = self._share(t_s)[0][:, None]
         return share * v, share * w
 
     def acceleration(self, t_s: Floats) -> Floats:
-        """dv/dt (n, 3) of v in body axes."""
+        """Returns dv/dt (n, 3) of v in body axes."""
         v, _ = drive.profile_at(t_s, self.speed_mps, self.lap_s)
         share, growth = (x[:, None] for x in self._share(t_s))
         return growth * v + share * drive.profile_slope(t_s, self.speed_mps)
 
     def _share(self, t_s: Floats) -> tuple[Floats, Floats]:
-        """Of the full speed, 0 to 1, and its derivative."""
+        """Returns the share of the full speed, 0 to 1, and its derivative."""
         share, growth = _smooth_step((t_s - self.rest_s) / RAMP_S)
         if self.parked or not self.rest_s:
             share, growth = np.full_like(t_s, not self.parked), np.zeros_like(t_s)
@@ -59,18 +59,18 @@ class Way(NamedTuple):
 
 
 def _smooth_step(x: Floats) -> tuple[Floats, Floats]:
-    """0 before 0, 1 after 1, with two derivatives; and its own derivative."""
+    """Returns a step from 0 to 1 over 0 to 1 with two derivatives, and its derivative."""
     x = np.clip(x, 0.0, 1.0)
     return x * x * x * (10 - 15 * x + 6 * x * x), 30 * x * x * (1 - x) * (1 - x)
 
 
 def seconds(t_ns: Times) -> Floats:
-    """Times as the velocities take them."""
+    """Returns times in seconds."""
     return np.asarray(t_ns * 1e-9, np.float64)
 
 
 def poses(t_ns: Times, way: Way) -> Poses:
-    """At ascending times, of which the first has the drive's first pose."""
+    """Returns poses at ascending times, beginning at the drive's first pose."""
     t_s = seconds(t_ns)
     tau = np.diff(t_s)
     middle = t_s[:-1] + 0.5 * tau
@@ -84,7 +84,7 @@ def poses(t_ns: Times, way: Way) -> Poses:
 
 
 def specific_force(t_ns: Times, way: Way, R_WB: Floats, gravity: float) -> Floats:
-    """What an accelerometer at the body's origin feels: dv/dt + w x v - R^T g."""
+    """Returns the specific force at the body's origin: dv/dt + w x v - R^T g."""
     t_s = seconds(t_ns)
     v, w = way.velocities(t_s)
     up = np.swapaxes(R_WB, 1, 2)

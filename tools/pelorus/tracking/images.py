@@ -170,7 +170,7 @@ def _times_in(file: Path, count: int) -> Times:
         raise ForeignFileError(
             file,
             f"has {len(seconds)} times",
-            due=f"{count} are expected, one for each pair of pictures",
+            expected=f"{count} are expected, one for each pair of pictures",
         )
     return arrays.nanoseconds(file, "time", seconds)
 
@@ -208,10 +208,10 @@ def bits_up_to(brightest: int, where: Path, remarks: list[str]) -> int:
 def read(pair: Pair, shape: tuple[int, ...] | None = None, bits: int = 16) -> tuple[Gray, Gray]:
     """Left and right, both of this shape (rows, columns), else of equal shape."""
     left = gray(pair.left, bits)
-    due = left.shape if shape is None else shape
-    _require_shape(pair.left, left, due, "the first picture has")
+    expected = left.shape if shape is None else shape
+    _require_shape(pair.left, left, expected, "the first picture has")
     right = gray(pair.right, bits)
-    _require_shape(pair.right, right, due, "the left ones have")
+    _require_shape(pair.right, right, expected, "the left ones have")
     return left, right
 
 
@@ -224,10 +224,12 @@ def in_order(found: Iterable[Pair], bits: int = 16) -> Iterator[tuple[Gray, Gray
         yield left, right
 
 
-def _require_shape(path: Path, image: Gray, due: tuple[int, ...], who: str) -> None:
-    if image.shape != due:
+def _require_shape(path: Path, image: Gray, expected: tuple[int, ...], who: str) -> None:
+    if image.shape != expected:
         raise ForeignFileError(
-            path, f"has {_size(image.shape)} pixels", due=f"{_size(due)} are expected, which {who}"
+            path,
+            f"has {_size(image.shape)} pixels",
+            expected=f"{_size(expected)} are expected, which {who}",
         )
 
 
@@ -243,7 +245,7 @@ def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> 
         raise ForeignFileError(
             path,
             f"the pictures have {_size(shape)} pixels",
-            due=f"{known[0]} x {known[1]} are expected, for which the calibration was made",
+            expected=f"{known[0]} x {known[1]} are expected, for which the calibration was made",
         )
 
 
@@ -252,7 +254,7 @@ def _require_side(path: Path, shape: tuple[int, ...]) -> None:
         raise ForeignFileError(
             path,
             f"has {_size(shape)} pixels",
-            due=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are expected",
+            expected=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are expected",
         )
 
 
@@ -287,7 +289,7 @@ def unpacked(path: Path, packed: bytes) -> NDArray[np.integer[Any]]:
         raise ForeignFileError(
             path,
             f"cannot be read as a picture: {error}",
-            due="a whole PNG, JPEG or PGM is expected",
+            expected="a whole PNG, JPEG or PGM is expected",
         ) from error
     _require_side(path, pixels.shape)
     return pixels

@@ -92,8 +92,8 @@ def find(image: Floats, patches: Patches, points: Points, window_px: int) -> Ref
         some = patches.where(active)
         seen, inside = _seen(image, A[active], c[active], x)
         JW = np.swapaxes(some.J * inside[..., None], 1, 2)
-        due = JW @ (seen - some.grey)[..., None]
-        step = np.linalg.solve(JW @ some.J + ridge, due)[..., 0]
+        expected = JW @ (seen - some.grey)[..., None]
+        step = np.linalg.solve(JW @ some.J + ridge, expected)[..., 0]
         step[:, :6] /= np.maximum(1 + step[:, 6:7], 0.3)  # contrast steepens all slopes alike
         step = np.clip(step, -STEP_MOST, STEP_MOST)
         A[active] = A[active] @ np.linalg.inv(np.eye(2) + step[:, 2:6].reshape(-1, 2, 2))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A log in three dimensions and over time, in viewers that robots' users have: Rerun, Foxglove."""
+"""Shows a log in three dimensions and over time, in Rerun and Foxglove."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a viewer is given of a drive, moment by moment, of a log or while it comes in.
+"""The data that a viewer gets of a drive, frame by frame, from a log or live.
 
 Times are in ns on the recording's clock. Positions are in the filter's world, m; ellipsoids are of
 three sigma.
@@ -32,7 +32,7 @@ TWIST = tuple(f"{kind} {axis}" for kind in ("linear", "turn") for axis in "xyz")
 
 
 def extra(module: str) -> Any:
-    """A library that is no part of every installation."""
+    """Imports an optional library; raises PelorusError with the extra to install."""
     try:
         return import_module(module)
     except ImportError as error:
@@ -43,10 +43,10 @@ def extra(module: str) -> Any:
 
 @dataclass
 class Moment:
-    """A stereo frame, and what the filter answered to it."""
+    """A stereo frame with the filter's answer."""
 
     frame: Stereo
-    pose: Pose | None = None  # of a frame that was not refused
+    pose: Pose | None = None  # None of a refused frame
     report: Report | None = None
     evidence: Evidence | None = None
     truth_W_m: Floats | None = None
@@ -57,7 +57,7 @@ class Moment:
 
     @property
     def condition(self) -> str:
-        """`degraded: identical pixels`."""
+        """Returns the health in words: `degraded: identical pixels`."""
         if self.report is None:
             return "no answer"
         health = schema.HEALTHS.get(self.report.health, f"health {self.report.health}")
@@ -68,11 +68,11 @@ class Moment:
 
     @property
     def rejected(self) -> list[int]:
-        """Ids that were seen and not used."""
+        """Returns ids that were seen and not used."""
         return [] if self.evidence is None else self.evidence.rejected["id"].tolist()
 
     def curves(self) -> dict[str, dict[str, float]]:
-        """Numbers over time, by what they belong to."""
+        """Returns numbers over time, by chart."""
         found: dict[str, dict[str, float]] = {}
         if (report := self.report) is not None:
             found["points"] = {name: float(getattr(report, name)) for name in COUNTS}
@@ -97,20 +97,20 @@ class Moment:
 
 
 class Viewer(Protocol):
-    """Shows or keeps a drive."""
+    """A viewer that shows a drive or writes it to a file."""
 
     def begin(self, header: Header) -> None: ...
 
     def moment(self, moment: Moment) -> None: ...
 
     def landmarks(self, t_ns: int, landmarks: Sequence[Landmark], shapes: Ellipsoids) -> None:
-        """That have left the state, or were in it at the end."""
+        """Shows landmarks that have left the state, or were in it at the end."""
         ...
 
     def end(self) -> None: ...
 
 
-class Drive:
+class ShownDrive:
     """Hands messages on to viewers as moments, in their order."""
 
     def __init__(
@@ -125,7 +125,7 @@ class Drive:
         self._left: list[Landmark] = []
 
     def take(self, message: Message) -> None:
-        """The next one, of an input or of an answer."""
+        """Takes the next message, an input or an answer."""
         match message:
             case Header() if not self._begun:
                 self._begun = True
@@ -150,7 +150,7 @@ class Drive:
                 pass
 
     def end(self) -> None:
-        """Nothing more comes."""
+        """Ends the drive."""
         self._hand_on()
         for viewer in self._viewers:
             viewer.end()
@@ -170,8 +170,8 @@ class Drive:
 
 
 def show(messages: Sequence[Message], viewers: Sequence[Viewer]) -> None:
-    """A whole log, with its truth brought to the estimate's start."""
-    drive = Drive(viewers, _truth(messages))
+    """Shows a whole log, with its truth moved to the estimate's start."""
+    drive = ShownDrive(viewers, _truth(messages))
     for message in messages:
         drive.take(message)
     drive.end()
@@ -189,5 +189,5 @@ def _truth(messages: Sequence[Message]) -> dict[int, Floats]:
 
 
 def quaternion(R: Floats) -> Floats:
-    """(4,) x y z w."""
+    """Returns the quaternion (4,), x y z w."""
     return np.asarray(Rotation.from_matrix(R).as_quat())

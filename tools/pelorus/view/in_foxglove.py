@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A drive as MCAP with Foxglove's own schemas: it opens in Foxglove, and in what reads MCAP."""
+"""Writes a drive as MCAP with Foxglove's own schemas, for Foxglove and other readers of MCAP."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from pelorus.view.drive import Moment, extra, quaternion
 S = 1_000_000_000
 WORLD, BODY, CAMERA = "world", "body", "camera"
 GREEN, RED, BLUE = (0.25, 0.82, 0.63), (0.84, 0.37, 0.0), (0.34, 0.71, 0.91)
-WAY_POINTS = 200  # a piece of the way is whole then, and another one begins
+WAY_POINTS = 200  # in a piece of the path
 
 
 class InFoxglove:
-    """A Viewer; the file is whole after `end`."""
+    """A Viewer; the file is complete after `end`."""
 
     def __init__(self, path: Path) -> None:
         foxglove = extra("foxglove")
@@ -57,7 +57,7 @@ class InFoxglove:
         self._header = header
 
     def _begun(self, t_ns: int, header: Header) -> None:
-        """What holds for the whole drive, at its first frame's time."""
+        """Writes what holds for the whole drive, at its first frame's time."""
         to, camera = self._to, header.camera
         R_BC = np.asarray(header.R_CB).T
         self._frame(t_ns, BODY, CAMERA, -R_BC @ header.t_CB_m, R_BC)
@@ -97,7 +97,7 @@ class InFoxglove:
             self._log(moment)
 
     def _curve(self, name: str, values: dict[str, float]) -> Any:
-        """A channel of JSON: Foxglove has no schema of plain numbers."""
+        """Returns a channel of JSON, for Foxglove has no schema of plain numbers."""
         numbers = {title: {"type": "number"} for title in values}
         schema = json.dumps({"type": "object", "properties": numbers}).encode()
         return self._foxglove.Channel(
@@ -186,7 +186,7 @@ class InFoxglove:
     def end(self) -> None:
         self._file.close()
 
-    # --- Foxglove's words -------------------------------------------------------------------------
+    # --- Foxglove's messages ----------------------------------------------------------------------
 
     def _say(self, channel: str, t_ns: int, message: object) -> None:
         self._channels[channel].log(message, log_time=t_ns)

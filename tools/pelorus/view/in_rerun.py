@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A drive in Rerun: a file to open later, a viewer that is started, or one that runs already.
+"""Shows a drive in Rerun: in a file, in a viewer that it starts, or in a running one.
 
-What grows, the way and the map, is kept in pieces of ten seconds, for an entity that is logged anew
-with each frame would hold the drive as often as it has frames.
+Path and map grow, and are kept in pieces of ten seconds: an entity that is logged anew with each
+frame would store the drive as often as it has frames.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pelorus.view.drive import Moment, extra, quaternion
 
 S = 1_000_000_000
 PIECE_NS = 10 * S
-SHOWN_NS = S  # a piece is shown anew so often
+SHOWN_NS = S  # interval at which the last piece is shown anew
 GREEN, RED, BLUE, ORANGE, GRAY = (
     (63, 208, 160),
     (213, 94, 0),
@@ -42,12 +42,12 @@ PANELS = ("innovations", "sigma", "points", "doubt", "odometry", "bias", "comput
 
 
 class InRerun:
-    """A Viewer. `rrd` keeps it; `connect` is a viewer's URL; `spawn` starts one."""
+    """A Viewer. `rrd` is a file; `connect` is a viewer's URL; `spawn` starts one."""
 
     def __init__(
         self, rrd: Path | None = None, connect: str | None = None, spawn: bool = False
     ) -> None:
-        os.environ.setdefault("RUST_LOG", "error")  # its warnings are for who writes programs
+        os.environ.setdefault("RUST_LOG", "error")  # its warnings are for programmers
         self._rr = extra("rerun")
         self._stream = self._rr.RecordingStream("pelorus")
         views = self._views()
@@ -70,7 +70,7 @@ class InRerun:
         self._origin_ns: int | None = None
         self._condition = ""
         self._way: list[Floats] = []
-        self._map: list[tuple[Landmark, Floats, Floats]] = []  # half axes, and their turn
+        self._map: list[tuple[Landmark, Floats, Floats]] = []  # half axes, and their rotation
         self._piece = 0
         self._shown_ns = 0
 
@@ -130,7 +130,7 @@ class InRerun:
             log("health", rr.TextLog(self._condition, level=LEVELS[health]))
 
     def _points(self, moment: Moment) -> None:
-        """Of the left picture, the rejected ones red."""
+        """Shows the points of the left picture, the rejected ones red."""
         frame = moment.frame
         rejected = np.isin(frame.ids, moment.rejected)
         colours = np.where(rejected[:, None], RED, GREEN).astype(np.uint8)
@@ -178,7 +178,7 @@ class InRerun:
 
 
 def _await_viewer() -> None:
-    """Of one that was started: without a display it ends at once."""
+    """Waits for a viewer that was started; without a display it ends at once."""
     until = time.monotonic() + START_S
     while time.monotonic() < until:
         with suppress(OSError):
@@ -191,16 +191,18 @@ def _await_viewer() -> None:
 
 
 def _require_viewer(url: str) -> None:
-    """The SDK itself waits for one for ever."""
+    """Refuses a URL without a viewer, for which the SDK would wait for ever."""
     forms = " or ".join(SCHEMES)
-    due = PelorusError(f"{url}: is no viewer's address: {forms}://HOST:{PORT}/proxy is expected")
+    expected = PelorusError(
+        f"{url}: is no viewer's address: {forms}://HOST:{PORT}/proxy is expected"
+    )
     try:
         at = urlsplit(url)
         port = at.port or PORT
     except ValueError:
-        raise due from None
+        raise expected from None
     if at.scheme not in SCHEMES or at.hostname is None:
-        raise due
+        raise expected
     try:
         socket.create_connection((at.hostname, port), CONNECT_S).close()
     except OSError as error:

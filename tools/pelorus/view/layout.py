@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A layout for Foxglove that shows what `view --mcap` writes: to import there."""
+"""A layout for Foxglove that shows what `view --mcap` writes, to be imported there."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TOPICS = ("odometry", "scene", "truth")
 
 
 def layout() -> str:
-    """As JSON."""
+    """Returns the layout as JSON."""
     panels: dict[str, Any] = {
         SCENE: {
             "followTf": "world",
@@ -73,6 +73,6 @@ def _split(direction: str, first: Any, second: Any, percent: int = 50) -> dict[s
 
 
 def _stacked(names: list[str]) -> Any:
-    """One above the other, alike in height."""
+    """Returns panels one above the other, of equal height."""
     head, *rest = names
     return _split("column", head, _stacked(rest), round(100 / len(names))) if rest else head

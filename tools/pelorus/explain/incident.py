@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Something that went wrong, from when to when."""
+"""An incident: something that went wrong, with its beginning and end."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ S = 1_000_000_000
 
 
 class Cause(StrEnum):
-    """In the order in which one makes another: of two that begin together the first made it."""
+    """Causes, in causal order: of two that begin together the earlier one causes the other."""
 
     CLOCK_STEP = "clock-step"
     NO_READINGS = "no-readings"
@@ -32,9 +32,11 @@ class Cause(StrEnum):
     SETTINGS = "settings"
 
 
-class Finding(NamedTuple):
-    """`words` say what the log shows of it, without its time. `noticed_ns` is when the filter
-    itself found it odd, where that is later than it began.
+class Incident(NamedTuple):
+    """An incident in a log.
+
+    `words` describe it without its time. `noticed_ns` is when the filter itself noticed it, where
+    that is later than it began.
     """
 
     cause: Cause
@@ -49,7 +51,7 @@ class Finding(NamedTuple):
 
     @property
     def remedy(self) -> str:
-        """What to look at first."""
+        """Returns what to check first."""
         return REMEDIES[self.cause]
 
 
