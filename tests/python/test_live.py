@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imu_drives import noisy
 from live_cameras import Scripted, Step, plugged_in, single
 from pelorus import se3
 from pelorus.cli import main
@@ -33,6 +34,7 @@ from rendered import SMALL
 from replay_drive import BIN
 from room import Room
 from scipy.spatial.transform import Rotation
+from test_causes import apart_by
 
 MS = 1_000_000
 
@@ -231,6 +233,33 @@ def test_pictures_21_ms_apart_give_no_pose_and_the_gap_is_told(
     said = told(Session(camera(recording, []), How()), sorted(apart, key=lambda one: one.t_ns))
     assert any("no partner within 2 ms, as a rule 21 ms apart; 0 pairs" in line for line in said)
     assert any("trigger the cameras together" in line for line in said)
+
+
+@pytest.mark.parametrize("apart_ms", [0.0, 21.0])
+def test_halves_that_were_taken_apart_under_one_stamp_are_found_by_their_rows(
+    apart_ms: float,
+) -> None:
+    """Once they are, no pose is good; and cameras that are triggered together are not accused.
+    At rest nothing shows, and nothing is wrong.
+    """
+    drive = noisy(7).recording
+    drive = apart_by(drive, apart_ms * 1e-3) if apart_ms else drive
+    session = Session(camera(drive, []), How(settings=drive.settings))
+    healths = [
+        (session.pipeline.together.found is not None, odom.estimate.health)
+        for one in single(list(drive.messages()))
+        for odom in session.take(one)
+        if session.pipeline.together is not None
+    ]
+    found = [health for is_found, health in healths if is_found]
+    if not apart_ms:
+        assert not found
+        assert healths[-1] == (False, 0)
+        return
+    assert len(found) > 15
+    assert min(found) > 0
+    said = [one.message for one in session.diagnose()]
+    assert any("ms apart, the right one later: points move by" in line for line in said), said
 
 
 def test_an_imu_alone_gives_no_pose_and_says_that_no_frames_come(

@@ -160,7 +160,7 @@ def _of_pair(recording: Recording) -> list[Fault]:
     wrong = list(_pixels(recording))
     if any(fault.name != "unrectified" for fault in wrong):
         return wrong
-    found = sync.apart(recording)
+    found = sync.apart(recording.tracks, recording.frame_t_ns, recording.header.camera)
     return wrong if found is None or not found.found else [found.fault]
 
 

@@ -19,7 +19,6 @@ from pelorus.faults.seen import standard_error
 from pelorus.frames import Camera
 from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.recording import Recording
 from pelorus.tracks import Tracks
 
 ROWS_LEAST = 500
@@ -42,31 +41,36 @@ class PictureDelay:
         return sure and self.moved_px > HARM_PX
 
     @property
-    def fault(self) -> Fault:
+    def words(self) -> str:
+        """Returns a sentence without its full stop."""
         later = "right" if self.by_s > 0 else "left"
-        return Fault(
-            "left-right-time",
+        return (
             f"left and right pictures are {abs(self.by_s) * 1e3:.0f} +- {self.sigma_s * 1e3:.1f} "
             f"ms apart, the {later} one later: points move by {self.moved_px:.1f} px meanwhile, "
-            "and rows differ as they do. Trigger both cameras together; with --pair-within, "
-            "less is right",
+            "and rows differ as they do"
+        )
+
+    @property
+    def fault(self) -> Fault:
+        return Fault(
+            "left-right-time",
+            f"{self.words}. Trigger both cameras together; with --pair-within, less is right",
             ratio=(self.by_s / self.sigma_s) ** 2,
         )
 
 
-def apart(recording: Recording) -> PictureDelay | None:
+def apart(tracks: Tracks, t_ns: Times, camera: Camera) -> PictureDelay | None:
     """Measures the delay; None with too few data.
 
     The rate is that between adjacent frames, and has noise; the rate between frames farther away
     has independent noise, and is its instrument.
     """
-    tracks, t_ns = recording.tracks, recording.frame_t_ns
     near, far = (_beside(tracks, t_ns, lag) for lag in (1, 2))
     both = np.isfinite(near.rows) & np.isfinite(far.rows)
     at = np.nonzero(both)[0]
     if len(at) < ROWS_LEAST:
         return None
-    place = _of_place(tracks.pixels[at], recording.header.camera)
+    place = _of_place(tracks.pixels[at], camera)
     difference = tracks.pixels[at, 3] - tracks.pixels[at, 1]
     rate, weight, by_s = near.rows[at], np.ones(len(at)), 0.0
     for _ in range(ROUNDS):

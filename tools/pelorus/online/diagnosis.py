@@ -13,6 +13,7 @@ from pelorus import schema
 from pelorus.health import HARMLESS, SHORT
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.pairs import Pairing
+from pelorus.online.together import Together
 
 GOOD, DEGRADED, LOST = 0, 1, 2
 MISSED_SHARE = 0.1  # of the pictures may lack their partner before it is told
@@ -110,6 +111,14 @@ def of_pairs(pairing: Pairing[Any]) -> list[Status]:
         "threshold of sync costs accuracy: speed times that time"
     )
     return [Status("sync", Level.WARN if paired else Level.ERROR, words, do)]
+
+
+def of_halves(together: Together | None) -> list[Status]:
+    """Returns whether the two pictures of a pair are taken together, by their rows."""
+    if together is None or together.found is None:
+        return []
+    do = "trigger both cameras together (hardware sync); health is no better than this until then"
+    return [Status("halves", Level.ERROR, together.found.words, do)]
 
 
 def of_speed(too_slow: int) -> list[Status]:

@@ -15,12 +15,15 @@ import numpy as np
 
 from pelorus.converters.streams import FORCES_MPS2
 from pelorus.errors import PelorusError
+from pelorus.faults.sync import PictureDelay
 from pelorus.frames import Header, Imu, Process, Stereo
 from pelorus.inertial import Inertial
+from pelorus.online.drive import LOST
 from pelorus.online.eyes import Eyes, Seen, open_eyes, require_size
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.order import Datum
 from pelorus.online.pairs import Joining, Pairing
+from pelorus.online.together import Together
 from pelorus.rig.read import Calibrated
 from pelorus.tracking.images import Gray
 
@@ -28,6 +31,7 @@ WINDOW = 50  # readings by whose median the unit is judged
 WINDOWS_ENOUGH = 4
 POINTS_ENOUGH = 10  # to tell by their disparities that the cameras are swapped
 G_MPS2 = 9.80665
+DEGRADED = 1
 CAMERAS, IMU = "cameras", "imu"
 
 
@@ -87,6 +91,7 @@ class Pipeline:
         self.joining = Joining()
         self._unit = UnitCheck(self._remedy)
         self._eyes: Eyes | None = None
+        self.together: Together | None = None
 
     # --- cameras
 
@@ -118,6 +123,9 @@ class Pipeline:
                 "and right swapped?"
             )
             return []
+        if self.together is None:
+            self.together = Together(self.calibrated.header.camera)
+        self.together.add(t_ns, seen)
         return self.add(Stereo(t_ns + offset_ns, seen.ids, seen.pixels))
 
     # --- motion
@@ -154,6 +162,17 @@ class Pipeline:
     def _told(self, odoms: list[Odom]) -> list[Odom]:
         if self.blocked:
             return []
+        if self.together is not None and self.together.found is not None:
+            odoms = [self._doubted(odom, self.together.found) for odom in odoms]
         if odoms:
             self.last = odoms[-1]
         return odoms
+
+    def _doubted(self, odom: Odom, apart: PictureDelay) -> Odom:
+        """Halves that were not taken together make points of no place: by more than a pixel's
+        noise the covariance holds nothing any more."""
+        drive = None if self.odometry is None else self.odometry.drive
+        noise_px = 1.0 if drive is None else drive.filter.setting("pixel-sigma")
+        least = LOST if apart.moved_px > noise_px else DEGRADED
+        worst = max(odom.estimate.health, least)
+        return odom._replace(estimate=odom.estimate._replace(health=worst))
