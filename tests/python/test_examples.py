@@ -44,7 +44,7 @@ const plr_frame *board_frame(void) {
         const double depth = 9 + 0.6 * i - x, right = (i % 2 ? -1 : 1) * (0.4 + 0.2 * i);
         const double u = 320 + 450 * right / depth, v = 240 + 450 * (0.1 * (i % 7) - 0.3) / depth;
         const float uR = (float)(u - 450 * 0.12 / depth);
-        seen[i] = (plr_observation){i, (float)u, (float)v, uR, (float)v};
+        seen[i] = (plr_observation){i, (float)u, (float)v, uR, (float)v, 0};
     }
     frame = (plr_frame){frames * 100000000ULL, PLR_NO_BUDGET, 12, seen};
     return &frame;
