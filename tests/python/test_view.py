@@ -295,6 +295,7 @@ def test_a_missing_library_is_one_sentence(
 def test_what_makes_no_sense_is_said(pelorus: Command, log: Path, tmp_path: Path) -> None:
     pytest.importorskip("rerun")
     said = pelorus("view", log, status=2).err
+    assert "--layout" in said
     assert "say where to show it" in " ".join(said.replace("│", " ").split())
     empty = tmp_path / "empty.plr"
     header = messages_of(log)[:1]
