@@ -36,6 +36,12 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "ANSWER_S", HANG_S)
 
 
+@pytest.fixture
+def built(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets `pelorus` find the programs and libraries of the build under test."""
+    monkeypatch.setenv("PELORUS_BIN", str(BIN))
+
+
 class Said(NamedTuple):
     status: int
     out: str

@@ -33,11 +33,7 @@ CAMERA = Calibration(410.0, 405.0, 330.0, 236.0, 0.17)
 NO_IDS, NO_PIXELS = np.zeros(0, np.uint32), np.zeros((0, 4), np.float32)
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 BUSY = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PELORUS_BIN", str(BIN))
+pytestmark = pytest.mark.usefixtures("built")
 
 
 def bits(R: Floats, p: Floats, triangle: Floats, precision: Precision) -> bytes:

@@ -9,15 +9,10 @@ from pathlib import Path
 
 import pytest
 from draws import draws
-from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests/independent/honest.py"
-
-
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PELORUS_BIN", str(BIN))
+pytestmark = pytest.mark.usefixtures("built")
 
 
 @pytest.mark.parametrize("words", draws([["--imu", "--runs", "30"], []]))

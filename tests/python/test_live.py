@@ -31,17 +31,12 @@ from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import messages_of
 from rendered import SMALL
-from replay_drive import BIN
 from room import Room
 from scipy.spatial.transform import Rotation
 from test_causes import apart_by
 
 MS = 1_000_000
-
-
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PELORUS_BIN", str(BIN))
+pytestmark = pytest.mark.usefixtures("built")
 
 
 @pytest.fixture(scope="module")

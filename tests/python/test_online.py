@@ -20,14 +20,9 @@ from pelorus.se3 import Poses
 from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import messages_of
-from replay_drive import BIN
 
 MS = 1_000_000
-
-
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PELORUS_BIN", str(BIN))
+pytestmark = pytest.mark.usefixtures("built")
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,6 @@ from pelorus.simulation.simulate import Options as Drive
 from pelorus.simulation.simulate import simulate
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options, misspelt, table
-from replay_drive import BIN
 from robot_messages import (
     camera_info,
     driven,
@@ -38,9 +37,7 @@ from ruamel.yaml import YAML
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2"
 
 
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PELORUS_BIN", str(BIN))
+pytestmark = pytest.mark.usefixtures("built")
 
 
 @pytest.fixture(scope="module")

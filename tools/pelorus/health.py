@@ -52,6 +52,7 @@ SYMPTOMS = tuple(
     SHORT[name] for name in ("POSE_MAY_BE_WRONG", "FEW_OBSERVATIONS", "NO_OBSERVATIONS")
 )
 NOT_STARTED = schema.number("reason", "NOT_STARTED")
+GOOD, DEGRADED, LOST = (schema.number("health", name) for name in ("GOOD", "DEGRADED", "LOST"))
 HARMLESS = schema.LIMITS["harmless_reasons"]  # they do not affect the estimate's quality
 
 

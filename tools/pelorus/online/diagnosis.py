@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from pelorus import schema
-from pelorus.health import HARMLESS, SHORT
+from pelorus.health import DEGRADED, GOOD, HARMLESS, SHORT
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.pairs import Pairing
 from pelorus.online.together import Together
 
-GOOD, DEGRADED, LOST = 0, 1, 2
 MISSED_SHARE = 0.1  # of the pictures may lack their partner before it is told
 LATE_SHARE = 0.02
 ALONE_LEAST = 6

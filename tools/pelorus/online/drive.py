@@ -43,7 +43,6 @@ from pelorus.wire import Writer
 SENSOR_NAMES = {number: name for name, number in schema.SENSORS.items()}
 DIVERGED = schema.number("status", "DIVERGED")
 NOT_STARTED = schema.number("reason", "NOT_STARTED")
-LOST = 2
 # Nothing is known: a sphere of a kilometre, and any angle.
 UNKNOWN_COVARIANCE = np.diag([1e6] * 3 + [np.pi**2 / 3] * 3)
 

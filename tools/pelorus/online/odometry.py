@@ -24,8 +24,9 @@ from pelorus import packed_file, se3
 from pelorus.errors import PelorusError
 from pelorus.filter import FilterError
 from pelorus.frames import Message, Process, Start, StartFlag, Stereo
+from pelorus.health import LOST
 from pelorus.layout import Floats, pack_symmetric
-from pelorus.online.drive import LOST, UNKNOWN_COVARIANCE, Drive, Estimate, Setup
+from pelorus.online.drive import UNKNOWN_COVARIANCE, Drive, Estimate, Setup
 from pelorus.online.order import ClockStep, Datum, Sequencer
 from pelorus.se3 import IDENTITY, Poses
 

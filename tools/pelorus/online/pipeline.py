@@ -17,8 +17,8 @@ from pelorus.converters.streams import FORCES_MPS2
 from pelorus.errors import PelorusError
 from pelorus.faults.sync import PictureDelay
 from pelorus.frames import Header, Imu, Process, Stereo
+from pelorus.health import DEGRADED, LOST
 from pelorus.inertial import Inertial
-from pelorus.online.drive import LOST
 from pelorus.online.eyes import Eyes, Seen, open_eyes, require_size
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.order import Datum
@@ -31,7 +31,6 @@ WINDOW = 50  # readings by whose median the unit is judged
 WINDOWS_ENOUGH = 4
 POINTS_ENOUGH = 10  # to tell by their disparities that the cameras are swapped
 G_MPS2 = 9.80665
-DEGRADED = 1
 CAMERAS, IMU = "cameras", "imu"
 
 
