@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from drives import clean
 from pelorus import motion, se3, visual_motion
-from pelorus.frames import Camera, TwistTiming
+from pelorus.frames import Camera, Header, Stereo, TwistTiming
+from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.second_view import linearised, measured, predicted
 from pelorus.tracks import Tracks, point_jacobian, project, triangulate
@@ -116,3 +117,24 @@ def test_images_alone_give_the_motion_of_the_camera() -> None:
     error = np.linalg.norm(se3.log(se3.compose(se3.inverse(Poses(*found)), true)), axis=1)
     assert np.median(error) < 0.01
     assert np.percentile(error, 95) < 0.05
+
+
+def test_an_observation_keeps_its_own_sigma_when_tracks_are_sorted_cut_and_renumbered() -> None:
+    frame, id = np.array([1, 0, 0]), np.array([4, 7, 5])
+    tracks = Tracks.from_rows(2, frame, id, np.ones((3, 4)), np.array([0.1, 0.2, 0.3]))
+    assert tracks.sigma_px is not None
+    assert tracks.sigma_px.tolist() == [0.3, 0.2, 0.1]
+    renumbered = tracks.with_ids(np.array([9, 1, 4])).at(np.array([True, True, False]))
+    assert renumbered.id.tolist() == [1, 9]
+    assert renumbered.sigma_px is not None
+    assert renumbered.sigma_px.tolist() == [0.2, 0.3]
+
+
+def test_a_recording_writes_the_sigmas_of_its_observations() -> None:
+    one, none = np.ones(1, np.intp), np.empty(0, np.int64)
+    camera = Camera(500, 500, 320, 240, 0.1)
+    tracks = Tracks(2, one, one, np.ones((1, 4)), np.array([0.25]))
+    empty = np.empty((0, 3))
+    drive = Recording(Header(camera), none, empty, empty, np.array([1, 2]), tracks)
+    sigmas = [m.sigmas for m in drive.messages() if isinstance(m, Stereo)]
+    assert [[] if own is None else own.tolist() for own in sigmas] == [[], [0.25]]

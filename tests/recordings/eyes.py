@@ -89,7 +89,8 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
     frame = np.repeat(np.arange(len(seen)), [len(one.observations) for one in seen])
     id = np.concatenate([one.observations["id"] for one in seen]).astype(np.int64)
     pixels = np.concatenate([one.pixels for one in seen]).astype(np.float64)
-    tracks = Tracks.from_rows(len(seen), frame, id, pixels)
+    sigma = np.concatenate([one.observations["sigma_px"] for one in seen]).astype(np.float64)
+    tracks = Tracks.from_rows(len(seen), frame, id, pixels, sigma)
     five = (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.baseline_m)
     header = replace(
         found.calibrated.header, camera=Camera(*five), R_CB=R, t_CB_m=np.asarray(camera.t_CB_m),
@@ -108,10 +109,8 @@ def later(drive: Recording, first: int) -> Recording:
     begin = drive.frame_t_ns[first]
     rows, own, true = drive.tracks.frame >= first, drive.inertial, drive.truth_t_ns >= begin
     kept = own.t_ns >= begin - 10_000_000
-    tracks = Tracks(
-        drive.tracks.frame_count - first, drive.tracks.frame[rows] - first, drive.tracks.id[rows],
-        drive.tracks.pixels[rows],
-    )  # fmt: skip
+    tracks, count = drive.tracks.at(rows), drive.tracks.frame_count - first
+    tracks = replace(tracks, frame_count=count, frame=tracks.frame - first)
     return replace(
         drive, frame_t_ns=drive.frame_t_ns[first:], tracks=tracks,
         inertial=Inertial(own.t_ns[kept], own.a_B_mps2[kept], own.w_B_radps[kept]),

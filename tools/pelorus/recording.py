@@ -158,9 +158,13 @@ class Recording:
         bounds = self.tracks.bounds()
         ids = self.tracks.id.astype(np.uint32)
         pixels = self.tracks.pixels.astype(np.float32)
+        own = self.tracks.sigma_px
+        sigmas = None if own is None else own.astype(np.float32)
         for k, t in enumerate(self.frame_t_ns.tolist()):
             rows = slice(bounds[k], bounds[k + 1])
-            yield t + self.camera_delay_ns, 3, Stereo(t, ids[rows], pixels[rows])
+            sigma = None if sigmas is None else sigmas[rows]
+            message = Stereo(t, ids[rows], pixels[rows], sigmas=sigma)
+            yield t + self.camera_delay_ns, 3, message
 
     def write(self, path: Path) -> int:
         """Writes the whole file; returns its size in bytes. Nothing remains if that fails."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,19 +68,32 @@ class Pairs(NamedTuple):
 
 @dataclass(frozen=True)
 class Tracks:
-    """Rows sorted by frame, then id: frame index, id, pixels (n, 4) in the order uL vL uR vR."""
+    """Rows sorted by frame, then id: frame index, id, pixels (n, 4) in the order uL vL uR vR.
+
+    `sigma_px` (n,) is of each of these pixels: 0 is the setting pixel-sigma, and None that of all.
+    """
 
     frame_count: int
     frame: Indices
     id: NDArray[np.int64]
     pixels: Floats
+    sigma_px: Floats | None = None
 
     @classmethod
     def from_rows(
-        cls, frame_count: int, frame: Indices, id: NDArray[np.int64], pixels: Floats
+        cls,
+        frame_count: int,
+        frame: Indices,
+        id: NDArray[np.int64],
+        pixels: Floats,
+        sigma_px: Floats | None = None,
     ) -> Tracks:
-        order = np.lexsort((id, frame))
-        return cls(frame_count, frame[order], id[order], pixels[order])
+        return cls(frame_count, frame, id, pixels, sigma_px).at(np.lexsort((id, frame)))
+
+    def at(self, rows: Indices | NDArray[np.bool_]) -> Tracks:
+        """Returns these rows, in this order."""
+        sigma = None if self.sigma_px is None else self.sigma_px[rows]
+        return Tracks(self.frame_count, self.frame[rows], self.id[rows], self.pixels[rows], sigma)
 
     @classmethod
     def from_dense(cls, features: Floats) -> Tracks:
@@ -93,7 +106,8 @@ class Tracks:
         return len(self.frame)
 
     def with_ids(self, id: NDArray[np.int64]) -> Tracks:
-        return self.from_rows(self.frame_count, self.frame, id, self.pixels)
+        tracks = replace(self, id=id)
+        return tracks.at(np.lexsort((id, self.frame)))
 
     def counts(self) -> NDArray[np.int64]:
         """Returns the number of observations of each frame."""

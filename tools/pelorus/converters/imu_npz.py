@@ -197,9 +197,7 @@ def _only(tracks: Tracks, frames: NDArray[np.bool_]) -> Tracks:
     """Returns the tracks of these frames, renumbered."""
     rows = frames[tracks.frame]
     number = np.cumsum(frames) - 1
-    return Tracks(
-        int(frames.sum()), number[tracks.frame[rows]], tracks.id[rows], tracks.pixels[rows]
-    )
+    return replace(tracks, frame_count=int(frames.sum()), frame=number[tracks.frame]).at(rows)
 
 
 def _truth(file: Arrays) -> imu_noise.TrueMotion:

@@ -8,6 +8,7 @@ after the first repeated one are kept while twists or gyro show no motion (`move
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -83,9 +84,7 @@ def left_out(
         return t_ns, tracks, []
     number = np.cumsum(~out) - 1
     kept = ~out[tracks.frame]
-    less = Tracks(
-        int((~out).sum()), number[tracks.frame[kept]], tracks.id[kept], tracks.pixels[kept]
-    )
+    less = replace(tracks, frame_count=int((~out).sum()), frame=number[tracks.frame]).at(kept)
     return t_ns[~out], less, _findings(int(out.sum()), count)
 
 

@@ -414,7 +414,7 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
             expected="pixels as the cameras took them are expected, of the calibration's "
             "resolution",
         )
-    return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
+    return replace(tracks, pixels=pixels).at(np.nonzero(good)[0])
 
 
 def _tracked(

@@ -218,8 +218,4 @@ def by_depth(tracks: Tracks) -> tuple[Tracks, Tracks]:
     _, number = np.unique(tracks.id, return_inverse=True)
     mean = np.bincount(number, disparity) / np.bincount(number)
     near = (mean >= np.median(mean[number]))[number]
-    halves = [
-        Tracks(tracks.frame_count, tracks.frame[k], tracks.id[k], tracks.pixels[k])
-        for k in (near, ~near)
-    ]
-    return halves[0], halves[1]
+    return tracks.at(near), tracks.at(~near)

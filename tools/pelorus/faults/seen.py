@@ -143,10 +143,7 @@ class Motions(NamedTuple):
 def by_turns(tracks: Tracks) -> list[Tracks]:
     """Returns two halves of the points, each point whole."""
     _, number = np.unique(tracks.id, return_inverse=True)
-    return [
-        Tracks(tracks.frame_count, tracks.frame[k], tracks.id[k], tracks.pixels[k])
-        for k in (number % 2 == 0, number % 2 == 1)
-    ]
+    return [tracks.at(number % 2 == half) for half in (0, 1)]
 
 
 def beside(x: Floats, *lags: int) -> Floats:

@@ -154,8 +154,7 @@ class Mishaps:
                 rows[k] = rows[max(int(stuck[0]) - 1, 0)]
         whose = np.concatenate(rows).astype(np.intp)
         frame = np.repeat(np.arange(tracks.frame_count), [len(row) for row in rows])
-        frozen = Tracks(tracks.frame_count, frame, tracks.id[whose], tracks.pixels[whose])
-        return frozen, whose
+        return replace(tracks.at(whose), frame=frame), whose
 
 
 NO_MISHAPS = Mishaps()
