@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Counts the instructions that fixed frames of `pelorus-bench --count` take, and keeps them in a table.
+"""Counts the instructions that fixed frames of `pelorus-bench --count` take, and keeps a table.
 
 usage: instructions.py [--write]
 
-Prints each count beside the table's (tests/bench/instructions.json); --write makes the table anew. Valgrind's
-callgrind counts, so the machine and what else it does have no part in it, but compiler and flags do: they are in
-the table.
+Prints each count beside the table's (tests/bench/instructions.json); --write makes the table anew.
+Valgrind's callgrind counts, so the machine and what else it does have no part in it, but compiler
+and flags do: they are in the table.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SETTINGS = ("CMAKE_BUILD_TYPE", "CMAKE_C_FLAGS", "PELORUS_ARCH", "PLR_BLOCK_OBSE
 
 
 def made_by(build: Path) -> dict[str, str]:
-    """Returns what the counts depend on besides the source: the compiler of a build, and its flags."""
+    """Returns what the counts depend on besides the source: a build's compiler and flags."""
     (compiler,) = build.glob("CMakeFiles/*/CMakeCCompiler.cmake")
     found = dict(
         re.findall(r"set\((CMAKE_C_COMPILER_(?:ID|VERSION)) \"(.*)\"\)", compiler.read_text())
@@ -81,6 +81,7 @@ def count(build: Path, name: str) -> int:
 
 
 def main() -> int:
+    """Counts, prints, and writes the table if told to."""
     build = ROOT / "build"
     if reason := why_not(build):
         print(f"instructions.py: {reason}", file=sys.stderr)

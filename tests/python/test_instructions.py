@@ -20,6 +20,6 @@ def test_a_fixed_input_takes_the_instructions_of_the_table(name: str) -> None:
         pytest.skip(f"skipped: the table is of {table['made by']}, the build of {made_by(build)}")
     expected, found = table["instructions"][name], count(build, name)
     assert abs(found - expected) <= MOST_CHANGE * expected, (
-        f"{name}: {found:,} instructions, {found / expected - 1:+.1%} beside the table's {expected:,}; "
+        f"{name}: {found:,} instructions, {found / expected - 1:+.1%} beside {expected:,}; "
         "if that is meant, run tests/python/instructions.py --write"
     )
