@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "math/dense.h"
+#include "math/leaky.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
@@ -241,7 +242,7 @@ static void learn_agreement(plr_supervisor *s) {
     const plr_real keeps = plr_limit(s, PLR_LIMIT_BEFORE_KEEPS);
     const bool agrees = s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
     if (agrees || s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE))
-        s->agreement = PLR_FMA(keeps, s->agreement, agrees ? PLR_R(1) - keeps : PLR_R(0));
+        s->agreement = plr_leaky_sum(s->agreement, keeps, agrees ? PLR_R(1) - keeps : PLR_R(0));
 }
 
 plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,
