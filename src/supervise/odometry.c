@@ -279,11 +279,14 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
 }
 
 void plr_odometry_weigh(plr_supervisor *s, plr_real excess) {
+    const plr_real keeps = plr_limit(s, PLR_LIMIT_SUM_KEEPS);
+    const plr_real before = s->slips ? PLR_R(0) : PLR_FMA(s->weight, s->weight, -PLR_R(1));
     s->weight = 1;
-    if (!s->slips || !plr_doubt_contradicted(s))
+    if (!plr_doubt_contradicted(s))
         return;
     const plr_real now = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
-    const plr_real most = now > excess ? now : excess;
-    s->weight = PLR_SQRT(PLR_FMA(plr_limit(s, PLR_LIMIT_WEIGHT_LOST), most, PLR_R(1)));
+    const plr_real lost = plr_limit(s, PLR_LIMIT_WEIGHT_LOST) * (now > excess ? now : excess);
+    const plr_real fades = keeps * keeps * before;
+    s->weight = PLR_SQRT((lost > fades ? lost : fades) + PLR_R(1));
     PLR_ASSERT(s->weight >= 1);
 }

@@ -52,6 +52,14 @@ bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
     return !s->frozen;
 }
 
+/* One that was seen to repeat at once is but a frame that is missing: the odometry bridges it. */
+bool plr_pictures_misled(const plr_supervisor *s) {
+    bool used = false;
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        used = used || s->frozen_variance[k] > 0 || s->frozen_motion[k] * s->frozen_motion[k] > 0;
+    return s->frozen && used;
+}
+
 /* ---------------------------------------------------------------- the gate */
 
 bool plr_pictures_reject_all(const plr_supervisor *s, unsigned matched, unsigned gated) {
