@@ -114,12 +114,9 @@ typedef struct plr_source {
     plr_inertial inertial;
     uint8_t reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
-    /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
-     * twists, while any is known; alignment with an IMU, until it has started. */
-    union {
-        plr_velocities velocities;
-        plr_alignment alignment;
-    } either;
+    /* Side by side, though each is used for a time alone: the checksum has them only then. */
+    plr_alignment alignment;   /* with an IMU, until it has started */
+    plr_velocities velocities; /* with twists, while any is known */
 } plr_source;
 
 #endif

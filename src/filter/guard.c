@@ -81,15 +81,15 @@ static uint64_t small_sum(const plr_filter *f) {
     const size_t used = plr_covariance_size(&f->belief, f->belief.count);
     plr_checksum sum = {{0}};
     ADD_BETWEEN(&sum, f, camera.estimate, source);
-    ADD_BETWEEN(&sum, f, source.reading_ns, source.either);
+    ADD_BETWEEN(&sum, f, source.reading_ns, source.alignment);
     ADD_BETWEEN(&sum, f, motion, belief);
     ADD_BETWEEN(&sum, f, belief.count, belief.slots);
     add(&sum, plr_covariance_elements(&f->belief), (used < HEAD ? used : HEAD) * sizeof(plr_real));
     ADD_BETWEEN(&sum, f, clock_started, guard);
     if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
-        add(&sum, &f->source.either.alignment, sizeof f->source.either.alignment);
+        add(&sum, &f->source.alignment, sizeof f->source.alignment);
     if (f->source.velocities_known)
-        add(&sum, &f->source.either.velocities, sizeof f->source.either.velocities);
+        add(&sum, &f->source.velocities, sizeof f->source.velocities);
     return mixed(&sum);
 }
 
