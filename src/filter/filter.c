@@ -189,6 +189,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     plr_motion_clear(&f->belief, &f->motion);
     plr_velocity_forget(&f->source);
     plr_alignment_clear(&f->source);
+    memset(&f->source.wheels, 0, sizeof f->source.wheels);
     f->belief.count = 0;
     f->belief.frame_number = 0;
     f->frames_off_the_map = 0;

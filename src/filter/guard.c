@@ -90,6 +90,8 @@ static uint64_t small_sum(const plr_filter *f) {
         add(&sum, &f->source.alignment, sizeof f->source.alignment);
     if (f->source.velocities_known)
         add(&sum, &f->source.velocities, sizeof f->source.velocities);
+    if (f->source.wheels.count > 0)
+        add(&sum, &f->source.wheels, sizeof f->source.wheels);
     return mixed(&sum);
 }
 
@@ -116,7 +118,8 @@ static bool is_in_range(const plr_filter *f) {
            c->known_map <= 1 && c->scene <= PLR_SCENE_MAY_MOVE &&
            c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
            c->slots <= PLR_MAX_LANDMARKS && f->belief.count <= c->slots && f->clock_started <= 1 &&
-           f->source.reading_valid <= 1 && f->motion.pending <= 1 && f->motion.noisy <= 1;
+           f->source.reading_valid <= 1 && f->source.wheels.count <= PLR_WHEELS &&
+           f->motion.pending <= 1 && f->motion.noisy <= 1;
 }
 
 bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]) {
