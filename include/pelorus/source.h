@@ -98,9 +98,12 @@ typedef struct plr_wheels {
     plr_time_ns t_ns[PLR_WHEELS]; /* of the last reading of each */
     plr_time_ns
         moved_ns[PLR_WHEELS]; /* of the last one that was not zero, or began a row of readings */
-    plr_time_ns rest_ns;      /* when a standstill was last told by them */
-    plr_real at_B[3 * PLR_WHEELS]; /* m; with an IMU seen from it */
-    uint8_t count;
+    plr_time_ns slip_ns[PLR_WHEELS];     /* since when it slips; 0: it does not */
+    plr_time_ns interval_ns[PLR_WHEELS]; /* between its last two readings */
+    plr_time_ns rest_ns;                 /* when a standstill was last told by them */
+    plr_real at_B[3 * PLR_WHEELS];       /* m; with an IMU seen from it */
+    plr_real slip[3 * PLR_WHEELS]; /* by how much a slipping one differs from the estimate, m/s */
+    uint8_t count, latest; /* latest: the one that sent the last reading; count: none of them */
 } plr_wheels;
 
 /* The source of motion, twists or an IMU: what init was given, and from `reading_ns` on what its readings have

@@ -167,6 +167,8 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
             m[part].of_wheel ? plr_gate_judge_wheel(f, &m[part]) : plr_gate_judge(f, &m[part]);
         result->d2 += (double)verdict.d2;
         accepted = accepted && verdict.accepted;
+        if (reading->sensor == PLR_SENSOR_WHEEL)
+            accepted = plr_wheels_hold(&f->source, m[part].r, accepted);
     }
     if (reading->sensor == PLR_SENSOR_STANDSTILL)
         f->source.inertial.still_ns = f->belief.t_ns;

@@ -12,6 +12,9 @@
  * long begins anew. */
 #define REST_NS       UINT64_C(500000000)
 #define REST_EVERY_NS UINT64_C(100000000)
+/* A slip is followed as it changes in so much time, s; and believed for so long. */
+#define SLIP_FOLLOWED_S PLR_R(0.2)
+#define SLIP_NS         UINT64_C(10000000000)
 
 static bool measures(const plr_reading *reading, unsigned axis) {
     return (reading->axes >> axis & 1) != 0;
@@ -41,6 +44,7 @@ void plr_wheels_note(plr_source *source, const plr_reading *reading) {
                               (plr_real)reading->at_B_m[2]};
     const unsigned k = number_of(wheels, at_B);
     PLR_ASSERT(wheels->count <= PLR_WHEELS);
+    wheels->latest = (uint8_t)k;
     if (k == PLR_WHEELS)
         return;
     bool moves = k == wheels->count || is_silent(wheels, k, reading->t_ns);
@@ -50,9 +54,34 @@ void plr_wheels_note(plr_source *source, const plr_reading *reading) {
     }
     for (unsigned i = 0; i < PLR_ROWS; i++)
         moves = moves || (measures(reading, i) && reading->value[i] * reading->value[i] > 0);
+    wheels->interval_ns[k] = reading->t_ns >= wheels->t_ns[k] ? reading->t_ns - wheels->t_ns[k] : 0;
     wheels->t_ns[k] = reading->t_ns;
     if (moves)
         wheels->moved_ns[k] = reading->t_ns;
+}
+
+bool plr_wheels_hold(plr_source *source, const plr_real r[PLR_ROWS], bool passed) {
+    plr_wheels *wheels = &source->wheels;
+    const unsigned k = wheels->latest;
+    if (k >= wheels->count)
+        return passed;
+    const plr_time_ns now = wheels->t_ns[k], since = wheels->slip_ns[k];
+    plr_real *slip = wheels->slip + 3 * k, off[3], next2 = 0;
+    const bool slips = since > 0 && since <= now;
+    for (unsigned i = 0; i < PLR_ROWS; i++) {
+        off[i] = slips ? r[i] - slip[i] : r[i];
+        next2 = PLR_FMA(off[i], off[i], next2);
+    }
+    if (passed && !(slips && now - since < SLIP_NS && plr_dot3(r, r) >= next2)) {
+        wheels->slip_ns[k] = 0;
+        return true;
+    }
+    const plr_real share = plr_seconds(wheels->interval_ns[k]) / SLIP_FOLLOWED_S;
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        slip[i] = slips && share < 1 ? PLR_FMA(share, off[i], slip[i]) : r[i];
+    if (!slips)
+        wheels->slip_ns[k] = now;
+    return false;
 }
 
 bool plr_wheels_stand(plr_source *source, plr_time_ns t_ns) {

@@ -17,6 +17,11 @@
 /* Notes where a reading's wheel sits, and whether it stands. */
 void plr_wheels_note(plr_source *source, const plr_reading *reading);
 
+/* True if the wheel of the last reading noted may be used: `passed` says that the gate accepted its residual r, m/s.
+ * A wheel that the gate has once rejected slips. An IMU alone grows uncertain, and the gate wide: what then passes it is
+ * used only if it is nearer to the estimate than to the slip as it has gone on, or after ten seconds. */
+bool plr_wheels_hold(plr_source *source, const plr_real r[PLR_ROWS], bool passed);
+
 /* True, and noted, if all wheels have read exactly zero for half a second, once each tenth of a second. */
 bool plr_wheels_stand(plr_source *source, plr_time_ns t_ns);
 
