@@ -50,8 +50,8 @@ MEANING = {
 
 @dataclass(frozen=True, eq=False)
 class Calibrated(Message, kind=Kind.CALIBRATION):
-    """The filter's calibration; `corrected` and `sigma` (11,), then those of the wheels (2,), are in
-    the order of PARTS.
+    """The filter's calibration: `corrected` and `sigma` (11,), and behind them `wheels` and
+    `wheels_sigma` (2,), are in the order of PARTS.
     """
 
     t_ns: int
