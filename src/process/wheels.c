@@ -12,6 +12,8 @@
  * long begins anew. */
 #define REST_NS       UINT64_C(500000000)
 #define REST_EVERY_NS UINT64_C(100000000)
+/* One rejected reading is chance, this many in succession are not. */
+#define CONFIRMED UINT64_C(5)
 /* A slip is followed as it changes in so much time, s; and believed for so long. */
 #define SLIP_FOLLOWED_S PLR_R(0.2)
 #define SLIP_NS         UINT64_C(10000000000)
@@ -72,7 +74,8 @@ bool plr_wheels_hold(plr_source *source, const plr_real r[PLR_ROWS], bool passed
         off[i] = slips ? r[i] - slip[i] : r[i];
         next2 = PLR_FMA(off[i], off[i], next2);
     }
-    if (passed && !(slips && now - since < SLIP_NS && plr_dot3(r, r) >= next2)) {
+    const bool confirmed = slips && now - since >= CONFIRMED * wheels->interval_ns[k];
+    if (passed && !(confirmed && now - since < SLIP_NS && plr_dot3(r, r) >= next2)) {
         wheels->slip_ns[k] = 0;
         return true;
     }

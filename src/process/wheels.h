@@ -18,7 +18,7 @@
 void plr_wheels_note(plr_source *source, const plr_reading *reading);
 
 /* True if the wheel of the last reading noted may be used: `passed` says that the gate accepted its residual r, m/s.
- * A wheel that the gate has once rejected slips. An IMU alone grows uncertain, and the gate wide: what then passes it is
+ * A wheel of which the gate has rejected six in succession slips. An IMU alone grows uncertain, and the gate wide: what then passes it is
  * used only if it is nearer to the estimate than to the slip as it has gone on, or after ten seconds. */
 bool plr_wheels_hold(plr_source *source, const plr_real r[PLR_ROWS], bool passed);
 
