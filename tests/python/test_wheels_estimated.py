@@ -113,4 +113,4 @@ def test_wheels_at_rest_are_a_standstill(tmp_path: Path) -> None:
         log = replayed(parked, tmp_path, "--standstill-sigma", name)
         P = unpack_symmetric(messages_of(log, Pose)[-1].velocity_covariance[None], 6)[0]
         sigma[name] = float(np.sqrt(P[:3, :3].diagonal().max()))
-    assert sigma["0.002"] < 0.005 < 0.05 < sigma["0"]
+    assert sigma["0.002"] < 0.2 * sigma["0"]
