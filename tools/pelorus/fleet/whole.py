@@ -16,7 +16,7 @@ from pelorus.evaluation import judge, path_m
 from pelorus.explain import Explanation, explain
 from pelorus.explain.incident import Cause, Incident
 from pelorus.fleet.row import finite
-from pelorus.frames import Config, Header, Kind, Landmark, Message, Pose, Report, Role
+from pelorus.frames import Config, Header, Kind, Landmark, Message, Pose, Report, Role, Truth
 from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory, estimate_in, truth_in
 
@@ -90,7 +90,8 @@ class Course:
                 self.made.append(m)
         while len(self.poses) > POSES_MOST:
             self.poses, self._stride = self.poses[::2], 2 * self._stride
-        if (truth := truth_in(messages)) is not None:
+        # Of all times: that of a piece's first frame stands before it, in the piece before.
+        if (truth := truth_in([m for m in messages if isinstance(m, Truth)])) is not None:
             self.truths.append(truth)
         if (estimate := estimate_in(messages)) is not None:
             poses = estimate[0].poses
