@@ -15,7 +15,7 @@ PACKAGES_BUILD=(gcc libc6-dev make cmake python3 python3-venv ca-certificates)
 PACKAGES_TEST=(g++ 'clang-14|clang' libopenblas-dev liblapacke-dev
     gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm)
 # Without these a check is skipped, saying so; without ninja builds take longer.
-PACKAGES_WANTED=(clang-format-14 libzstd-dev ninja-build pkg-config qemu-user-static)
+PACKAGES_WANTED=(clang-format-14 libzstd-dev ninja-build pkg-config qemu-user-static valgrind)
 
 heading() {
     printf '\n=== %s\n' "$*"

@@ -29,6 +29,8 @@ export PELORUS_DATA=${PELORUS_DATA:-$ROOT/../shared/data}
 export PELORUS_LONG=0
 [ $extent = long ] && PELORUS_LONG=1
 export OPENBLAS_NUM_THREADS=1 # tests run side by side
+unset PYTHONDONTWRITEBYTECODE # hundreds of commands are started: each would compile its modules anew
+export PYTHONPYCACHEPREFIX=$LOGS/pycache
 cd "$ROOT" || exit 1
 rm -rf "$LOGS"
 mkdir -p "$LOGS"
@@ -241,8 +243,11 @@ if [ $extent != quick ]; then
     [ $extent = long ] && systems=()
     beside 'same bits on other systems' "$VENV/bin/python" tools/cross.py "${systems[@]}"
 
-    # Of these two nothing is installed, and no library built that nothing links.
-    step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF &&
+    # Of these two nothing is installed, and no library built that nothing links. Memory and undefined
+    # behaviour are the same source in float64: its tests are built with --long, and one with other blocks always.
+    reals=()
+    [ $extent = long ] || reals=(-DPELORUS_TEST_REALS=f32)
+    step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF "${reals[@]+"${reals[@]}"}" &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
     # Another compiler, and without a fused multiply-add instruction. Where the golden tests and the units
     # compute the same bits, so would the long drives: they are built with --long alone, for their warnings.

@@ -62,9 +62,9 @@ extern "C" {
 #define PLR_SUPERVISE 1
 #endif
 
-/* Most numbers of the camera's calibration that can be estimated (setting calibrate): 0 to 11, default
+/* Most numbers of the calibration that can be estimated (setting calibrate): 0 to 13, default
  * 5, for focal length, baseline and turn. Up to 5 take no more memory than to consider these does, which
- * every build can; up to 9, and up to 11, four numbers more for each row of the state. No bit of what is
+ * every build can; up to 9, and up to 13, four numbers more for each row of the state. No bit of what is
  * computed without them depends on it. */
 #ifndef PLR_MAX_CALIBRATION
 #define PLR_MAX_CALIBRATION 5
@@ -145,8 +145,8 @@ extern "C" {
 #error "PLR_BLOCK_OBSERVATIONS must be 1 to 16."
 #endif
 
-#if PLR_MAX_CALIBRATION < 0 || PLR_MAX_CALIBRATION > 11
-#error "PLR_MAX_CALIBRATION must be 0 to 11."
+#if PLR_MAX_CALIBRATION < 0 || PLR_MAX_CALIBRATION > 13
+#error "PLR_MAX_CALIBRATION must be 0 to 13."
 #endif
 
 #if PLR_VISION_PIXELS < 2304 || PLR_VISION_PIXELS > 16777216

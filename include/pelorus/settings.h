@@ -71,14 +71,16 @@ typedef enum plr_landmark_prior {
                                  report does (its Sigma_m) */
 } plr_landmark_prior;
 
-/* Parts of the camera's calibration, as bits. */
+/* Parts of the calibration of camera and wheels, as bits. */
 typedef enum plr_calibrate {
-    PLR_CALIBRATE_FOCAL = 1,    /* focal-sigma */
-    PLR_CALIBRATE_BASELINE = 2, /* baseline-sigma */
-    PLR_CALIBRATE_TURN = 4,     /* camera-turn-sigma, about three axes */
-    PLR_CALIBRATE_CENTRE = 8,   /* centre-sigma, u and v */
-    PLR_CALIBRATE_PLACE = 16,   /* camera-place-sigma, along three axes */
-    PLR_CALIBRATE_CLOCK = 32    /* camera-clock-sigma */
+    PLR_CALIBRATE_FOCAL = 1,        /* focal-sigma */
+    PLR_CALIBRATE_BASELINE = 2,     /* baseline-sigma */
+    PLR_CALIBRATE_TURN = 4,         /* camera-turn-sigma, about three axes */
+    PLR_CALIBRATE_CENTRE = 8,       /* centre-sigma, u and v */
+    PLR_CALIBRATE_PLACE = 16,       /* camera-place-sigma, along three axes */
+    PLR_CALIBRATE_CLOCK = 32,       /* camera-clock-sigma */
+    PLR_CALIBRATE_WHEEL_SCALE = 64, /* wheel-scale-sigma */
+    PLR_CALIBRATE_WHEEL_TRACK = 128 /* wheel-track-sigma */
 } plr_calibrate;
 
 /* The settings of a filter. Fill it by plr_config_default and change what your robot needs: usually
@@ -115,8 +117,8 @@ typedef struct plr_config {
      * choose it only where the twists have no such errors. An IMU needs 1. */
     uint8_t bias;
 
-    /* Setting calibrate: 0 to 63, default 0.
-     * Which parts of the camera's calibration are estimated on the way: bits of plr_calibrate. Each
+    /* Setting calibrate: 0 to 255, default 0.
+     * Which parts of the calibration are estimated on the way: bits of plr_calibrate. Each
      * begins as the calibration says, with the sigma of its own setting, and is learnt as far as the
      * drive shows it: with an IMU a minute of walking with turns shows all of them, at rest and at
      * constant speed none is observable. With twists less is: their scale and axes may be wrong too, and
@@ -362,6 +364,22 @@ typedef struct plr_config {
      * longer than twist-delay. If it is positive and a frame comes before the steps up to its time,
      * as in a recording in order of stamps, it waits that much longer for them. */
     double camera_offset_s;
+
+    /* Setting wheel-scale-sigma: 0 to 0.2, default 0.
+     * Beside an IMU: standard deviation of the share by which the radius of the wheels may be wrong, the same of
+     * all. It is considered, or with calibrate = wheel-scale estimated. */
+    double wheel_scale_sigma;
+
+    /* Setting wheel-track-sigma: 0 to 0.2, default 0.
+     * The same of the distance between wheels: their places (at_B_m) move away from the middle of all
+     * that have sent a reading, at most four. calibrate = wheel-track estimates it. */
+    double wheel_track_sigma;
+
+    /* Setting wheel-slide-sigma [m/s]: 0 to 10, default 0.
+     * A body that can neither slide nor rise: along the axes that a wheel's reading does not measure its point
+     * has the velocity 0 with this standard deviation. 0: a reading says nothing of the other axes, as for wheels that
+     * roll sideways. It is that of one reading, and independent from one to the next. */
+    double wheel_slide_sigma_mps;
 } plr_config;
 
 /* How a setting's value is written. */

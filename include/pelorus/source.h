@@ -91,6 +91,21 @@ typedef struct plr_velocities {
     plr_real bias_eta[PLR_BIAS_DIM];
 } plr_velocities;
 
+enum { PLR_WHEELS = 4 };
+
+/* Wheels, each known by its place: src/process/wheels.h. */
+typedef struct plr_wheels {
+    plr_time_ns t_ns[PLR_WHEELS]; /* of the last reading of each */
+    plr_time_ns
+        moved_ns[PLR_WHEELS]; /* of the last one that was not zero, or began a row of readings */
+    plr_time_ns slip_ns[PLR_WHEELS];     /* since when it slips; 0: it does not */
+    plr_time_ns interval_ns[PLR_WHEELS]; /* between its last two readings */
+    plr_time_ns rest_ns;                 /* when a standstill was last told by them */
+    plr_real at_B[3 * PLR_WHEELS];       /* m; with an IMU seen from it */
+    plr_real slip[3 * PLR_WHEELS]; /* by how much a slipping one differs from the estimate, m/s */
+    uint8_t count, latest; /* latest: the one that sent the last reading; count: none of them */
+} plr_wheels;
+
 /* The source of motion, twists or an IMU: what init was given, and from `reading_ns` on what its readings have
  * shown. Of sigmas the squares. */
 typedef struct plr_source {
@@ -114,12 +129,10 @@ typedef struct plr_source {
     plr_inertial inertial;
     uint8_t reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
-    /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
-     * twists, while any is known; alignment with an IMU, until it has started. */
-    union {
-        plr_velocities velocities;
-        plr_alignment alignment;
-    } either;
+    /* Side by side, though each is used for a time alone: the checksum has them only then. */
+    plr_alignment alignment;   /* with an IMU, until it has started */
+    plr_velocities velocities; /* with twists, while any is known */
+    plr_wheels wheels;         /* once one has sent a reading */
 } plr_source;
 
 #endif

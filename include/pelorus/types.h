@@ -289,6 +289,8 @@ typedef enum plr_calibration_error {
     PLR_CAMERA_PLACE_Y,
     PLR_CAMERA_PLACE_Z,
     PLR_CAMERA_CLOCK, /* to be added to the time of a frame, s */
+    PLR_WHEEL_SCALE, /* of wheels beside an IMU: the share by which their speed is more than they read */
+    PLR_WHEEL_TRACK, /* the same of their distance from each other */
     PLR_CALIBRATION_ERRORS
 } plr_calibration_error;
 

@@ -40,7 +40,7 @@ typedef enum plr_kind {
 
 enum {
     PLR_WIRE_VERSION_MAJOR = 1,
-    PLR_WIRE_VERSION_MINOR = 7,
+    PLR_WIRE_VERSION_MINOR = 8,
     PLR_WIRE_KINDS = 16,     /* kinds are 1 to this */
     PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
     PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */

@@ -194,7 +194,9 @@ static void print_calibration(const plr_session *session) {
                                        {"place x", "mm", 1000},
                                        {"place y", "mm", 1000},
                                        {"place z", "mm", 1000},
-                                       {"clock", "ms", 1000}};
+                                       {"clock", "ms", 1000},
+                                       {"wheel scale", "%", 100},
+                                       {"wheel track", "%", 100}};
     plr_calibration_result told;
     const char *between = "calibration   corrected by ";
     if (plr_filter_calibration(&session->filter, &told) != PLR_OK || told.estimated == 0)

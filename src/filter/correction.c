@@ -114,16 +114,20 @@ static unsigned whole_tiles(const plr_filter *f) {
 
 /* A column of the sensitivity (state/sensitivity.h) is corrected as dx is, with -H_s in the place of
  * the residual: by how much the error of the calibration changes what is predicted. */
-static void stack_sensitivity(const plr_filter *f, const plr_sighting *row, const plr_rows *H,
-                              plr_batch *batch, unsigned first) {
+static void stack_sensitivity(const plr_filter *f, const plr_sighting *row,
+                              const plr_measurement *m, plr_batch *batch, unsigned first) {
     plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS], column[PLR_ROWS];
     memset(H_s, 0, f->camera.errors.count * sizeof *H_s);
     if (row && f->camera.errors.count > 0)
         plr_stereo_by_calibration(&f->belief, &f->camera, row->slot, row->seen, H_s);
+    for (unsigned k = 0; !row && m->of_wheel && k < f->camera.errors.count; k++)
+        if (f->camera.errors.kind[k] >= PLR_WHEEL_SCALE)
+            memcpy(H_s[k], m->by_wheel.error[f->camera.errors.kind[k] - PLR_WHEEL_SCALE],
+                   sizeof H_s[k]);
     for (unsigned k = 0; OF_S + k < whole_tiles(f); k++) {
         const bool has_column = k < f->camera.errors.count;
         if (has_column)
-            plr_rows_apply(H, f->belief.S[k], column);
+            plr_rows_apply(&m->H, f->belief.S[k], column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             batch->E[WIDE * (first + r) + OF_S + k] = has_column ? H_s[k][r] + column[r] : PLR_R(0);
     }
@@ -276,7 +280,7 @@ static plr_status correct_by_batch(plr_filter *f, plr_sensed *sensed, unsigned a
         const plr_sighting *row = at + i < sensed->seen ? next_row(sensed) : NULL;
         get_measurement(f, sensed, at + i, row, &m);
         stack(f, &m, PLR_ROWS * i, &batch);
-        stack_sensitivity(f, row, &m.H, &batch, PLR_ROWS * i);
+        stack_sensitivity(f, row, &m, &batch, PLR_ROWS * i);
         batch.empty += row && plr_is_left_alone(row->seen);
     }
     if (apply_batch(f, &batch, &factorised)) {

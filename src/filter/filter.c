@@ -187,8 +187,9 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(&f->motion.core, 0, sizeof f->motion.core);
     plr_calibration_reset(&f->camera);
     plr_motion_clear(&f->belief, &f->motion);
-    plr_velocity_forget(&f->belief, &f->source);
-    plr_alignment_clear(&f->belief, &f->source);
+    plr_velocity_forget(&f->source);
+    plr_alignment_clear(&f->source);
+    memset(&f->source.wheels, 0, sizeof f->source.wheels);
     f->belief.count = 0;
     f->belief.frame_number = 0;
     f->frames_off_the_map = 0;
@@ -208,7 +209,7 @@ plr_status plr_filter_reset(plr_filter *f) {
 /* ---------------------------------------------------------------- set by the caller */
 
 void plr_filter_forget_reading(plr_filter *f) {
-    plr_velocity_forget(&f->belief, &f->source);
+    plr_velocity_forget(&f->source);
     f->source.reading_valid = 0;
     f->source.interval_s = 0;
     plr_process_of(&f->source)->rest(&f->belief, &f->source, f->source.reading);

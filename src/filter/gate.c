@@ -3,6 +3,7 @@
 
 #include "math/small.h"
 #include "state/covariance.h"
+#include "state/sensitivity.h"
 #include "supervise/supervise.h"
 
 /* Ten sigmas. A point that begins to move is not off by so much from one frame to the next. */
@@ -20,12 +21,16 @@ bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2) {
            (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
 }
 
-plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
+/* by_wheel: of errors of the wheels, too; NULL: it is no wheel's. */
+static plr_verdict judge(const plr_filter *f, const plr_measurement *m,
+                         const plr_by_wheel *by_wheel) {
     plr_verdict verdict = {.accepted = false};
     plr_real full[9], S[6], e[3];
     plr_covariance_of_rows(&f->belief, &m->H, full);
     if (f->work.noise.open)
         plr_covariance_add_open_noise(&f->belief, &f->work.noise, &m->H, full);
+    if (by_wheel)
+        plr_sensitivity_add_to_rows(&f->belief, &f->camera, &m->H, by_wheel, full);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         if (m->max_variance > 0 && !(full[4 * i] <= m->max_variance))
             return verdict;
@@ -39,4 +44,12 @@ plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
     verdict.det_S = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
     verdict.accepted = plr_gate_accepts(f, verdict.d2, m->residual2);
     return verdict;
+}
+
+plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
+    return judge(f, m, NULL);
+}
+
+plr_verdict plr_gate_judge_wheel(const plr_filter *f, const plr_measurement *m) {
+    return judge(f, m, &m->by_wheel);
 }

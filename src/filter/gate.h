@@ -46,4 +46,7 @@ static inline bool plr_gate_rejected(const plr_sighting *s) {
  * variance of a predicted row exceeds max_variance. */
 plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m);
 
+/* The same of a wheel's reading: what its errors of scale and track explain is no slip. */
+plr_verdict plr_gate_judge_wheel(const plr_filter *f, const plr_measurement *m);
+
 #endif

@@ -81,15 +81,17 @@ static uint64_t small_sum(const plr_filter *f) {
     const size_t used = plr_covariance_size(&f->belief, f->belief.count);
     plr_checksum sum = {{0}};
     ADD_BETWEEN(&sum, f, camera.estimate, source);
-    ADD_BETWEEN(&sum, f, source.reading_ns, source.either);
+    ADD_BETWEEN(&sum, f, source.reading_ns, source.alignment);
     ADD_BETWEEN(&sum, f, motion, belief);
     ADD_BETWEEN(&sum, f, belief.count, belief.slots);
     add(&sum, plr_covariance_elements(&f->belief), (used < HEAD ? used : HEAD) * sizeof(plr_real));
     ADD_BETWEEN(&sum, f, clock_started, guard);
     if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
-        add(&sum, &f->source.either.alignment, sizeof f->source.either.alignment);
+        add(&sum, &f->source.alignment, sizeof f->source.alignment);
     if (f->source.velocities_known)
-        add(&sum, &f->source.either.velocities, sizeof f->source.either.velocities);
+        add(&sum, &f->source.velocities, sizeof f->source.velocities);
+    if (f->source.wheels.count > 0)
+        add(&sum, &f->source.wheels, sizeof f->source.wheels);
     return mixed(&sum);
 }
 
@@ -116,7 +118,8 @@ static bool is_in_range(const plr_filter *f) {
            c->known_map <= 1 && c->scene <= PLR_SCENE_MAY_MOVE &&
            c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
            c->slots <= PLR_MAX_LANDMARKS && f->belief.count <= c->slots && f->clock_started <= 1 &&
-           f->source.reading_valid <= 1 && f->motion.pending <= 1 && f->motion.noisy <= 1;
+           f->source.reading_valid <= 1 && f->source.wheels.count <= PLR_WHEELS &&
+           f->motion.pending <= 1 && f->motion.noisy <= 1;
 }
 
 bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]) {

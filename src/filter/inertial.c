@@ -119,7 +119,7 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
 
 /* What is expected, px^2: pixels have noise, and tracks have wandered since the stretch began. */
 static plr_real still2(const plr_filter *f, const plr_observation *seen) {
-    const plr_alignment *at = &f->source.either.alignment;
+    const plr_alignment *at = &f->source.alignment;
     const plr_real seconds = at->count > 0 ? plr_seconds(f->belief.t_ns - at->begin_ns) : PLR_R(0);
     return PLR_R(4) * plr_stereo_pixel_variance(&f->camera, seen) +
            PLR_R(2) * f->camera.track_drift_variance * seconds;
@@ -164,10 +164,10 @@ static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_o
 
 void plr_filter_watch_start(plr_filter *f, const plr_sightings *sightings) {
     unsigned seen = 0, moved = 0;
-    const bool early = plr_alignment_is_early(&f->source.either.alignment, f->belief.t_ns);
+    const bool early = plr_alignment_is_early(&f->source.alignment, f->belief.t_ns);
     for (unsigned k = 0; k < sightings->count; k++) {
         const plr_observation *o = sightings->at[k].seen;
-        plr_watched_point *point = watched(&f->source.either.alignment, o->id);
+        plr_watched_point *point = watched(&f->source.alignment, o->id);
         if (!point)
             continue;
         if (point->used) {
@@ -180,7 +180,7 @@ void plr_filter_watch_start(plr_filter *f, const plr_sightings *sightings) {
     if (seen < PLR_POINTS_LEAST ||
         2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
-    f->source.either.alignment.seen_to_move = 1;
+    f->source.alignment.seen_to_move = 1;
     plr_alignment_restart(&f->source);
     plr_alignment_does_not_stand(&f->source, PLR_IMU_FAULT_MOVES);
 }

@@ -18,8 +18,10 @@
 #include "process/alignment.h"
 #include "process/process.h"
 #include "process/velocity.h"
+#include "process/wheels.h"
 #include "sensor/sensor.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/motion.h"
 #include "state/seconds.h"
 #include "state/sensitivity.h"
@@ -135,10 +137,18 @@ static bool correct(plr_filter *f, plr_status status, const plr_measurement *m, 
     return status == PLR_OK;
 }
 
-/* Where velocity is estimated, a reading of the twist is one of the state: gates it, and applies
- * it. */
+/* True if an error of the wheels is considered or estimated. */
+static bool has_wheel_errors(const plr_filter *f) {
+    const plr_error_columns *errors = &f->camera.errors;
+    return plr_calibration_column(errors, PLR_WHEEL_SCALE) < errors->count ||
+           plr_calibration_column(errors, PLR_WHEEL_TRACK) < errors->count;
+}
+
+/* Where velocity is estimated, a reading of the twist is one of the state: gates it, and applies it. Of a wheel's it
+ * has measured the axes `measured` itself. */
 static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
-                              const plr_reading *reading, plr_reading_result *result) {
+                              const plr_reading *reading, uint8_t measured,
+                              plr_reading_result *result) {
     plr_twist_rows rows[2];
     plr_measurement m[2];
     bool accepted = true;
@@ -149,9 +159,16 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     for (unsigned part = 0; part < parts && status == PLR_OK; part++) {
         plr_process_of(&f->source)
             ->measure(&f->belief, &f->source, &rows[part], &m[part].H, m[part].r, m[part].R);
-        const plr_verdict verdict = plr_gate_judge(f, &m[part]);
+        m[part].of_wheel = reading->sensor == PLR_SENSOR_WHEEL && has_wheel_errors(f);
+        if (m[part].of_wheel)
+            plr_wheels_differentiate(&f->belief, &f->source, &f->camera, reading, measured,
+                                     rows[part].z, m[part].r, &m[part].by_wheel);
+        const plr_verdict verdict =
+            m[part].of_wheel ? plr_gate_judge_wheel(f, &m[part]) : plr_gate_judge(f, &m[part]);
         result->d2 += (double)verdict.d2;
         accepted = accepted && verdict.accepted;
+        if (reading->sensor == PLR_SENSOR_WHEEL)
+            accepted = plr_wheels_hold(&f->source, m[part].r, accepted);
     }
     if (reading->sensor == PLR_SENSOR_STANDSTILL)
         f->source.inertial.still_ns = f->belief.t_ns;
@@ -225,9 +242,16 @@ static void count(plr_filter *f, const plr_reading_result *result) {
 
 bool plr_measure_twist(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
     const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
+    plr_reading whole = *reading;
     PLR_ASSERT(kind->of_twist);
-    result->used = plr_process_of(&f->source)->measure ? apply_to_velocity(f, kind, reading, result)
-                                                       : hold(f, kind, reading, result);
+    if (reading->sensor == PLR_SENSOR_WHEEL) {
+        plr_wheels_note(&f->source, reading);
+        plr_wheels_correct(&f->source, &f->camera, &whole);
+        plr_wheels_deny_slide(&whole, f->config.wheel_slide_sigma_mps);
+    }
+    result->used = plr_process_of(&f->source)->measure
+                       ? apply_to_velocity(f, kind, &whole, reading->axes, result)
+                       : hold(f, kind, &whole, result);
     count(f, result);
     return result->used;
 }
@@ -251,8 +275,22 @@ static void supervise(plr_filter *f, const plr_reading *reading, bool used, doub
         numbers += plr_reading_has(reading, i);
     if (reading->sensor == PLR_SENSOR_STANDSTILL) /* three of each of its bits */
         numbers *= 3;
+    if (reading->sensor == PLR_SENSOR_WHEEL && f->config.wheel_slide_sigma_mps > 0)
+        numbers = PLR_ROWS;
     plr_supervise_reading(&f->supervisor, reading, numbers, used, (plr_real)d2, bounds,
                           f->belief.t_ns);
+}
+
+/* Wheels that stand measure a standstill, as pictures do that stand. */
+static void rest_by_wheels(plr_filter *f) {
+    const double sigma = f->config.standstill_sigma_mps;
+    plr_reading still = {.t_ns = f->belief.t_ns,
+                         .sensor = PLR_SENSOR_STANDSTILL,
+                         .axes = 3,
+                         .sigma = {sigma, sigma, 0}};
+    plr_reading_result unused = {0};
+    if (sigma > 0 && plr_wheels_stand(&f->source, f->belief.t_ns))
+        (void)plr_measure_twist(f, &still, &unused);
 }
 
 static plr_status refuse(plr_filter *f, plr_status status, plr_reading_result *result) {
@@ -281,6 +319,8 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
     plr_predict_to(f, reading->t_ns);
     const bool used = measure(f, &seen_from_imu, got);
     supervise(f, reading, used, got->d2);
+    if (used && reading->sensor == PLR_SENSOR_WHEEL)
+        rest_by_wheels(f);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

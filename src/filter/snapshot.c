@@ -17,7 +17,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 15 };
+enum { STATE_VERSION = 16 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -287,7 +287,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     PASS(c, f, filter);
     if (f) {
         f->belief.count = count.landmarks;
-        plr_velocity_forget(&f->belief, &f->source); /* their clock is not the one that goes on */
+        plr_velocity_forget(&f->source); /* their clock is not the one that goes on */
         memset(f->belief.slots, 0, sizeof f->belief.slots);
         plr_supervise_restored(&f->supervisor);
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "filter/tracks.h"
 
+#include "math/leaky.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
 
@@ -20,8 +21,8 @@ enum {
 
 void plr_track_add(plr_slot *slot, const plr_real e[3]) {
     for (unsigned r = 0; r < 3; r++)
-        slot->innovation_sum[r] = PLR_FMA(DECAY, slot->innovation_sum[r], e[r]);
-    slot->innovation_variance = PLR_FMA(DECAY * DECAY, slot->innovation_variance, PLR_R(1));
+        slot->innovation_sum[r] = plr_leaky_sum(slot->innovation_sum[r], DECAY, e[r]);
+    slot->innovation_variance = plr_leaky_sum(slot->innovation_variance, DECAY * DECAY, PLR_R(1));
     PLR_ASSERT(slot->innovation_variance >= 1);
     if (plr_dot3(slot->innovation_sum, slot->innovation_sum) >
         MOVING_ABOVE * slot->innovation_variance)

@@ -167,6 +167,8 @@ static plr_correction motion_first(plr_filter *f, plr_sightings *frame,
     plr_bias_consider(f, decision->hold_biases, &before);
     if (first.outright)
         plr_motion_open_velocity(&f->belief, &f->motion);
+    else
+        plr_motion_widen_velocity(&f->belief, &f->motion, plr_supervise_weight(&f->supervisor));
     correction.status = plr_predict_apply(f, &first.motion);
     if (correction.status != PLR_OK)
         return correction;

@@ -33,7 +33,7 @@ void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_rea
         sandwich(S, m, B, PLR_DRIVERS, P);
 }
 
-enum { STRIP = PLR_TILE_COLUMNS, FEW = 3 };
+enum { STRIP = PLR_TILE_COLUMNS, EIGHT = 8, FOUR = 4, FEW = 3 };
 
 /* x[c] = from[c] - sum_l U(l, i) y_l[c] for a strip of columns, l = 0 .. i-1, y_l = y + sum of the
  * steps before: STRIP numbers that stay in registers. The first step reads `from`, for a copy would
@@ -123,23 +123,20 @@ static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) 
         solve_four_rows(k, U, i, X, ldx);
 }
 
-/* The same for columns that make no strip, FEW or one. Inlined for each number. */
+/* The same for columns that make no strip: row by row, each taken from all below at once, so that no sum
+ * waits for the one before it. Inlined for each number of columns. */
 static inline void solve_columns(unsigned columns, unsigned k, const plr_real *restrict U,
-                                 plr_real *X, size_t ldx) {
-    for (unsigned i = 0; i < k; i++) {
-        const plr_real *u = U + i, *above = X;
-        plr_real x[FEW];
+                                 plr_real *restrict X, size_t ldx) {
+    for (unsigned l = 0; l < k; l++, X += ldx) {
+        const plr_real inverse = PLR_R(1) / *U++;
+        plr_real x[EIGHT], *below = X + ldx;
         for (unsigned c = 0; c < columns; c++)
-            x[c] = X[i * ldx + c];
-        for (unsigned l = 0; l < i; l++) {
+            X[c] = x[c] = X[c] * inverse;
+        for (unsigned i = l + 1; i < k; i++, below += ldx) {
+            const plr_real u = *U++;
             for (unsigned c = 0; c < columns; c++)
-                x[c] = PLR_FMA(-*u, above[c], x[c]);
-            u += k - l - 1;
-            above += ldx;
+                below[c] = PLR_FMA(u, -x[c], below[c]);
         }
-        const plr_real inverse = PLR_R(1) / *u;
-        for (unsigned c = 0; c < columns; c++)
-            X[i * ldx + c] = x[c] * inverse;
     }
 }
 
@@ -149,6 +146,10 @@ void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_r
     unsigned j = 0;
     for (; j + STRIP <= n; j += STRIP)
         solve_strip(k, U, X + j, ldx);
+    for (; STRIP > EIGHT && j + EIGHT <= n; j += EIGHT)
+        solve_columns(EIGHT, k, U, X + j, ldx);
+    for (; STRIP > EIGHT && j + FOUR <= n; j += FOUR)
+        solve_columns(FOUR, k, U, X + j, ldx);
     for (; j + FEW <= n; j += FEW)
         solve_columns(FEW, k, U, X + j, ldx);
     for (; j < n; j++)

@@ -7,26 +7,82 @@
 #include "math/tile.h"
 #include "pelorus/assertions.h"
 
-enum { ROWS = PLR_TILE_ROWS, COLUMNS = PLR_TILE_COLUMNS };
+/* With wide registers six rows make a tile: twelve sums hide how long each takes, and a row of W is read less
+ * often. */
+enum {
+    COLUMNS = PLR_TILE_COLUMNS,
+    IS_WIDE = COLUMNS == 16 && PLR_REAL == 32,
+    ROWS = IS_WIDE ? 6 : PLR_TILE_ROWS,
+    CORNER = PLR_TILE_ROWS
+};
 
-/* A tile that the diagonal cuts, from column j on: only what lies inside is written. */
+/* Tiles of six rows: X_r -= sum_k A(k, r) V_k, V depth x n, A depth x 6, as plr_subtract_four_rows. */
+static void subtract_six_rows(unsigned n, unsigned depth, const plr_real *A, const plr_real *V,
+                              size_t ld, plr_real *const X[6]) {
+    for (unsigned j = 0; j < n; j += COLUMNS) {
+        const plr_real *u = A, *w = V + j;
+        plr_tile_row a0, a1, a2, a3, a4, a5;
+        plr_tile_less(a0, u[0], w, X[0] + j);
+        plr_tile_less(a1, u[1], w, X[1] + j);
+        plr_tile_less(a2, u[2], w, X[2] + j);
+        plr_tile_less(a3, u[3], w, X[3] + j);
+        plr_tile_less(a4, u[4], w, X[4] + j);
+        plr_tile_less(a5, u[5], w, X[5] + j);
+        for (unsigned steps = depth - 2; steps > 0; steps--) {
+            u += ld;
+            w += ld;
+            plr_tile_reduce(a0, u[0], w);
+            plr_tile_reduce(a1, u[1], w);
+            plr_tile_reduce(a2, u[2], w);
+            plr_tile_reduce(a3, u[3], w);
+            plr_tile_reduce(a4, u[4], w);
+            plr_tile_reduce(a5, u[5], w);
+        }
+        u += ld;
+        w += ld;
+        plr_tile_less(X[0] + j, u[0], w, a0);
+        plr_tile_less(X[1] + j, u[1], w, a1);
+        plr_tile_less(X[2] + j, u[2], w, a2);
+        plr_tile_less(X[3] + j, u[3], w, a3);
+        plr_tile_less(X[4] + j, u[4], w, a4);
+        plr_tile_less(X[5] + j, u[5], w, a5);
+    }
+}
+
+static inline void subtract_rows(unsigned n, unsigned depth, const plr_real *A, const plr_real *V,
+                                 size_t ld, plr_real *const X[ROWS]) {
+    if (IS_WIDE)
+        subtract_six_rows(n, depth, A, V, ld, X);
+    else
+        plr_subtract_four_rows(n, depth, A, ld, V, ld, X);
+}
+
+/* A tile that the diagonal cuts, from column j on: only what lies inside changes. Wide registers write back
+ * what stood in the rest: to choose is faster than to branch. */
 static void subtract_cut_tile(unsigned i, unsigned j, unsigned depth, const plr_real *Ut,
-                              const plr_real *Wt, size_t ld, plr_real *const row[ROWS]) {
+                              const plr_real *Wt, size_t ld, plr_real *P) {
     plr_tile_row tile[ROWS];
-    plr_real *const at[ROWS] = {tile[0], tile[1], tile[2], tile[3]};
-    for (unsigned r = 0; r < ROWS; r++)
-        memcpy(tile[r], row[r] + j, sizeof tile[r]);
-    plr_subtract_four_rows(COLUMNS, depth, Ut + i, ld, Wt + j, ld, at);
-    for (unsigned r = 0; r < ROWS; r++)
-        for (unsigned c = 0; c < COLUMNS && j + c <= i + r; c++)
-            row[r][j + c] = tile[r][c];
+    plr_real *at[ROWS];
+    for (unsigned r = 0; r < ROWS; r++) {
+        at[r] = tile[r];
+        memcpy(tile[r], P + plr_packed_row(i + r) + j, sizeof tile[r]);
+    }
+    subtract_rows(COLUMNS, depth, Ut + i, Wt + j, ld, at);
+    for (unsigned r = 0; r < ROWS; r++) {
+        plr_real *row = P + plr_packed_row(i + r) + j;
+        const int inside = (int)(i + r + 1) - (int)j;
+        for (int c = 0; IS_WIDE && c < COLUMNS; c++)
+            row[c] = c < inside ? tile[r][c] : row[c];
+        for (int c = 0; !IS_WIDE && c < COLUMNS && c < inside; c++)
+            row[c] = tile[r][c];
+    }
 }
 
 /* P -= U W^T in the triangle of `size` rows from number i on. Inlined for each size. */
 static inline void subtract_triangle(unsigned size, unsigned i, unsigned depth,
                                      const plr_real *restrict Ut, const plr_real *restrict Wt,
                                      size_t ld, plr_real *restrict P) {
-    plr_real sum[ROWS][ROWS];
+    plr_real sum[CORNER][CORNER];
     for (unsigned c = 0; c < size; c++)
         for (unsigned r = c; r < size; r++)
             sum[r][c] = P[plr_packed_row(i + r) + i + c];
@@ -44,7 +100,7 @@ static inline void subtract_triangle(unsigned size, unsigned i, unsigned depth,
             P[plr_packed_row(i + r) + i + c] = sum[r][c];
 }
 
-/* The same for a size from 0 to ROWS. */
+/* The same for a size from 0 to CORNER. */
 static void subtract_corner(unsigned size, unsigned i, unsigned depth, const plr_real *Ut,
                             const plr_real *Wt, size_t ld, plr_real *P) {
     if (size == 1)
@@ -57,8 +113,8 @@ static void subtract_corner(unsigned size, unsigned i, unsigned depth, const plr
         subtract_triangle(4, i, depth, Ut, Wt, ld, P);
 }
 
-/* The rows beyond a multiple of ROWS are the first, which are shortest. Of four rows come first the
- * whole tiles, then a cut one if there is more than a triangle beside them. */
+/* The rows beyond a multiple of ROWS are the first, which are shortest. Of the others come first the
+ * whole tiles, then cut ones where there is more than a triangle beside them. */
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P) {
     PLR_ASSERT(ld >= n);
@@ -66,16 +122,19 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
         plr_packed_subtract_plain(n, depth, Ut, Wt, ld, P);
         return;
     }
-    subtract_corner(n % ROWS, 0, depth, Ut, Wt, ld, P);
-    for (unsigned i = n % ROWS; i < n; i += ROWS) {
-        plr_real *const row[ROWS] = {P + plr_packed_row(i), P + plr_packed_row(i + 1),
-                                     P + plr_packed_row(i + 2), P + plr_packed_row(i + 3)};
+    const unsigned alone = n % ROWS;
+    if (alone <= CORNER)
+        subtract_corner(alone, 0, depth, Ut, Wt, ld, P);
+    else
+        plr_packed_subtract_plain(alone, depth, Ut, Wt, ld, P);
+    for (unsigned i = alone; i < n; i += ROWS) {
+        plr_real *row[ROWS];
+        for (unsigned r = 0; r < ROWS; r++)
+            row[r] = P + plr_packed_row(i + r);
         unsigned j = (i + 1) / COLUMNS * COLUMNS;
-        plr_subtract_four_rows(j, depth, Ut + i, ld, Wt, ld, row);
-        if (j < i) {
-            subtract_cut_tile(i, j, depth, Ut, Wt, ld, row);
-            j += COLUMNS;
-        }
+        subtract_rows(j, depth, Ut + i, Wt, ld, row);
+        for (; i + ROWS > j + CORNER; j += COLUMNS)
+            subtract_cut_tile(i, j, depth, Ut, Wt, ld, P);
         if (j < i + ROWS)
             subtract_corner(i + ROWS - j, j, depth, Ut, Wt, ld, P);
     }

@@ -50,23 +50,22 @@ enum { ANCHOR_FRAMES = 10 };
 /* Within this time, s, tilt and velocity are found; their product has misled position and yaw. */
 #define FOUND_S PLR_R(0.5)
 
-void plr_alignment_clear(const plr_belief *belief, plr_source *source) {
+void plr_alignment_clear(plr_source *source) {
     memset(&source->inertial, 0, sizeof source->inertial);
-    if (plr_has_block(belief, PLR_BLOCK_VELOCITY))
-        memset(&source->either.alignment, 0, sizeof source->either.alignment);
+    memset(&source->alignment, 0, sizeof source->alignment);
 }
 
 void plr_alignment_restart(plr_source *source) {
-    const plr_alignment before = source->either.alignment;
-    memset(&source->either.alignment, 0, sizeof source->either.alignment);
-    source->either.alignment.first_ns = before.first_ns;
-    source->either.alignment.seen_to_move = before.seen_to_move;
+    const plr_alignment before = source->alignment;
+    memset(&source->alignment, 0, sizeof source->alignment);
+    source->alignment.first_ns = before.first_ns;
+    source->alignment.seen_to_move = before.seen_to_move;
 }
 
 /* What is being averaged ends at a pause, and altogether where the clock became another. */
 static void end_stretch(plr_source *source, plr_time_ns t_ns) {
     if (!source->reading_valid)
-        memset(&source->either.alignment, 0, sizeof source->either.alignment);
+        memset(&source->alignment, 0, sizeof source->alignment);
     else if (t_ns - source->reading_ns > PAUSE_NS)
         plr_alignment_restart(source);
 }
@@ -225,8 +224,8 @@ static void begin(plr_source *source, plr_time_ns t_ns, plr_real interval) {
     s->started_ns = s->still_ns = t_ns;
     source->bias_walked_s = 0; /* the biases begin with their prior's variances */
     s->usual_s = interval;
-    memcpy(s->slow, source->either.alignment.mean, sizeof s->slow);
-    memset(&source->either.alignment, 0, sizeof source->either.alignment); /* as after a restore */
+    memcpy(s->slow, source->alignment.mean, sizeof s->slow);
+    memset(&source->alignment, 0, sizeof source->alignment); /* as after a restore */
 }
 
 /* The unit vector of a mean specific force less its bias; returns its length, m/s^2. */
@@ -267,7 +266,7 @@ static plr_imu_fault find_fault(const plr_belief *belief, const plr_source *sour
 static void start_at_rest(plr_belief *belief, plr_source *source, plr_time_ns t_ns,
                           plr_real interval, const plr_real u[3]) {
     enum { A = 0, G = 3 };
-    const plr_alignment *at = &source->either.alignment;
+    const plr_alignment *at = &source->alignment;
     const plr_real readings = (plr_real)at->count, g2 = source->gravity * source->gravity;
     const bool calm = is_calm(source, at, interval); /* else the pictures have said that it rests */
     const plr_real speed = calm ? REST_VELOCITY : SEEN_VELOCITY;
@@ -331,7 +330,7 @@ void plr_alignment_does_not_stand(plr_source *source, plr_imu_fault how) {
 
 /* Starts if the stretch that was averaged is good for it. */
 static bool try_to_start(plr_belief *belief, plr_source *source, plr_time_ns t_ns, bool at_rest) {
-    plr_alignment *at = &source->either.alignment;
+    plr_alignment *at = &source->alignment;
     plr_real u[3];
     const plr_real interval =
         (plr_real)((double)(t_ns - at->begin_ns) * 1e-9 / (double)(at->count - 1));
@@ -359,7 +358,7 @@ static bool try_to_start(plr_belief *belief, plr_source *source, plr_time_ns t_n
 void plr_alignment_add(plr_belief *belief, plr_source *source, const plr_config *config,
                        plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
     const plr_imu_start kind = (plr_imu_start)config->imu_start;
-    plr_alignment *at = &source->either.alignment;
+    plr_alignment *at = &source->alignment;
     if (kind == PLR_IMU_START_GIVEN) {
         if (!source->inertial.pose_given)
             return;

@@ -13,7 +13,7 @@
 #include "pelorus/source.h"
 
 /* Not started, nothing averaged. */
-void plr_alignment_clear(const plr_belief *belief, plr_source *source);
+void plr_alignment_clear(plr_source *source);
 
 /* Adds a reading (a, w) of before the start, and starts by it if the readings are good for that: sets pose,
  * velocity and biases, with their covariance. There may be no landmarks. */

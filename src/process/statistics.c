@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "math/leaky.h"
 #include "math/small.h"
 #include "state/seconds.h"
 
@@ -36,7 +37,7 @@ static void learn_scatter(plr_source *source, const plr_real reading[PLR_POSE_DI
     }
     for (unsigned i = 0; i < 2 && is_usual; i++)
         s->scatter2[i] =
-            PLR_FMA(CHANGE_SHARE, off2[i] / PLR_R(18) - s->scatter2[i], s->scatter2[i]);
+            plr_leaky_mean(s->scatter2[i], CHANGE_SHARE, off2[i] / PLR_R(18));
 }
 
 void plr_statistics_learn(const plr_belief *belief, plr_source *source, plr_time_ns t_ns,
@@ -52,11 +53,11 @@ void plr_statistics_learn(const plr_belief *belief, plr_source *source, plr_time
     if (!(s->usual_s > 0) || interval < PLR_R(0.5) * s->usual_s)
         s->usual_s = interval;
     else if (interval < PLR_R(1.5) * s->usual_s)
-        s->usual_s = PLR_FMA(INTERVAL_SHARE, interval - s->usual_s, s->usual_s);
+        s->usual_s = plr_leaky_mean(s->usual_s, INTERVAL_SHARE, interval);
     const plr_real late = interval - s->usual_s;
-    s->off_usual2 = PLR_FMA(CHANGE_SHARE, late * late - s->off_usual2, s->off_usual2);
+    s->off_usual2 = plr_leaky_mean(s->off_usual2, CHANGE_SHARE, late * late);
     for (unsigned i = 0; i < 2; i++)
-        s->change2[i] = PLR_FMA(CHANGE_SHARE, change2[i] / PLR_R(3) - s->change2[i], s->change2[i]);
+        s->change2[i] = plr_leaky_mean(s->change2[i], CHANGE_SHARE, change2[i] / PLR_R(3));
     learn_scatter(source, reading, interval);
     const plr_real since = plr_seconds(t_ns - s->still_ns), span = since < SLOW_S ? since : SLOW_S;
     const plr_real share = interval < span ? interval / span : PLR_R(1);
@@ -65,8 +66,8 @@ void plr_statistics_learn(const plr_belief *belief, plr_source *source, plr_time
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
         const plr_real off = reading[i] - s->slow[i];
         off2[i / 3] = PLR_FMA(off, off, off2[i / 3]);
-        s->slow[i] = PLR_FMA(share, off, s->slow[i]);
+        s->slow[i] = plr_leaky_mean(s->slow[i], share, reading[i]);
     }
     for (unsigned i = 0; i < 2; i++)
-        s->spread2[i] = PLR_FMA(slower, off2[i] / PLR_R(3) - s->spread2[i], s->spread2[i]);
+        s->spread2[i] = plr_leaky_mean(s->spread2[i], slower, off2[i] / PLR_R(3));
 }

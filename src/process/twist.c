@@ -175,7 +175,7 @@ static void step(plr_belief *belief, plr_motion *motion, plr_source *source, plr
         plr_velocity_fuse(belief, source, t_ns, seconds, xi, V, T);
         make_up(by, T, xi);
         if (!is_possible(xi)) { /* no step of a robot: the velocities are wrong */
-            plr_velocity_forget(belief, source);
+            plr_velocity_forget(source);
             displacement(belief, by->mean, seconds, xi);
             fused = false;
         }

@@ -33,8 +33,8 @@ void plr_velocity_hold(const plr_belief *belief, plr_source *source, unsigned wh
                        const plr_twist_rows *rows) {
     PLR_ASSERT(which < PLR_HELD_VELOCITIES);
     if (!source->velocities_known)
-        plr_velocity_forget(belief, source);
-    plr_held_velocity *held = &source->either.velocities.held[which];
+        plr_velocity_forget(source);
+    plr_held_velocity *held = &source->velocities.held[which];
     const plr_time_ns before = held->interval_ns, interval = interval_of(held, belief->t_ns);
     /* where a reading was lost or rejected, the interval of before */
     const plr_time_ns usual = before > 0 && before < interval ? before : interval;
@@ -48,18 +48,16 @@ void plr_velocity_hold(const plr_belief *belief, plr_source *source, unsigned wh
         held->density[r] = rows->R[r] * plr_seconds(held->interval_ns);
 }
 
-void plr_velocity_forget(const plr_belief *belief, plr_source *source) {
+void plr_velocity_forget(plr_source *source) {
     source->velocities_known = 0;
-    if (!plr_has_block(belief,
-                       PLR_BLOCK_VELOCITY)) /* else nothing is held, and the place is taken */
-        memset(&source->either.velocities, 0, sizeof source->either.velocities);
+    memset(&source->velocities, 0, sizeof source->velocities);
 }
 
 void plr_velocity_forget_bias(plr_source *source) {
     if (!source->velocities_known)
         return;
-    memset(source->either.velocities.bias_Lambda, 0, sizeof source->either.velocities.bias_Lambda);
-    memset(source->either.velocities.bias_eta, 0, sizeof source->either.velocities.bias_eta);
+    memset(source->velocities.bias_Lambda, 0, sizeof source->velocities.bias_Lambda);
+    memset(source->velocities.bias_eta, 0, sizeof source->velocities.bias_eta);
 }
 
 /* For a step from the filter's time to end_ns. */
@@ -69,7 +67,7 @@ static bool holds(const plr_belief *belief, const plr_held_velocity *held, plr_t
 
 bool plr_velocity_is_held(const plr_belief *belief, const plr_source *source, plr_time_ns end_ns) {
     for (unsigned i = 0; source->velocities_known && i < PLR_HELD_VELOCITIES; i++)
-        if (holds(belief, &source->either.velocities.held[i], end_ns))
+        if (holds(belief, &source->velocities.held[i], end_ns))
             return true;
     return false;
 }
@@ -77,8 +75,7 @@ bool plr_velocity_is_held(const plr_belief *belief, const plr_source *source, pl
 /* Lambda += Y^T Y, eta += Y^T e for e = U^-T (s z - M xi) = Y db + N(0, I), Y = -s U^-T M T. */
 static void add_bias_information(plr_source *source, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
-    plr_real *eta = source->either.velocities.bias_eta,
-             *Lambda = source->either.velocities.bias_Lambda;
+    plr_real *eta = source->velocities.bias_eta, *Lambda = source->velocities.bias_Lambda;
     for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
             const plr_real *y = Y + PLR_POSE_DIM * r;
@@ -192,15 +189,15 @@ void plr_velocity_fuse(const plr_belief *belief, plr_source *source, plr_time_ns
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         T[(PLR_POSE_DIM + 1) * i] = 1;
     for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
-        if (holds(belief, &source->either.velocities.held[i], end_ns))
-            fuse_one(belief, source, &source->either.velocities.held[i], seconds, xi, V, T);
+        if (holds(belief, &source->velocities.held[i], end_ns))
+            fuse_one(belief, source, &source->velocities.held[i], seconds, xi, V, T);
 }
 
 /* ---------------------------------------------------------------- the biases */
 
 bool plr_velocity_informs_bias(const plr_source *source) {
     for (unsigned i = 0; source->velocities_known && i < PLR_BIAS_DIM; i++)
-        if (source->either.velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
+        if (source->velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
             return true;
     return false;
 }
@@ -209,10 +206,10 @@ bool plr_velocity_informs_bias(const plr_source *source) {
 void plr_velocity_bias_rows(const plr_belief *belief, const plr_source *source, unsigned part,
                             plr_rows *H, plr_real r[PLR_ROWS]) {
     plr_real L[PLR_POSE_SQUARE], y[PLR_BIAS_DIM];
-    plr_factor6(L, source->either.velocities.bias_Lambda);
+    plr_factor6(L, source->velocities.bias_Lambda);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
         const plr_real pivot = L[(PLR_BIAS_DIM + 1) * k];
-        y[k] = source->either.velocities.bias_eta[k];
+        y[k] = source->velocities.bias_eta[k];
         for (unsigned l = 0; l < k; l++)
             y[k] = PLR_FMA(-L[PLR_BIAS_DIM * k + l], y[l], y[k]);
         y[k] = pivot > 0 ? y[k] / pivot : PLR_R(0);

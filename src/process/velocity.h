@@ -21,7 +21,7 @@ void plr_velocity_hold(const plr_belief *belief, plr_source *source, unsigned wh
                        const plr_twist_rows *rows);
 
 /* Drops all held rows and what they say of the biases: the clock or the biases change. */
-void plr_velocity_forget(const plr_belief *belief, plr_source *source);
+void plr_velocity_forget(plr_source *source);
 
 /* Drops the information about the biases, which a correction has used. */
 void plr_velocity_forget_bias(plr_source *source);

@@ -14,8 +14,8 @@ static const char *const prior_words[] = {"correlated", "independent", NULL};
 static const char *const process_words[] = {"twist", "imu", NULL};
 static const char *const imu_start_words[] = {"auto", "rest", "motion", "given", NULL};
 static const char *const scene_words[] = {"stands", "may-move", NULL};
-static const char *const calibrate_words[] = {"focal", "baseline", "turn", "centre",
-                                              "place", "clock",    NULL};
+static const char *const calibrate_words[] = {
+    "focal", "baseline", "turn", "centre", "place", "clock", "wheel-scale", "wheel-track", NULL};
 static const char *const switch_words[] = {"off", "on", NULL};
 
 /* How a field of plr_config is stored. */
@@ -179,10 +179,10 @@ void plr_config_course(plr_config *config) {
 
 /* For each part of the calibration, by its bit of plr_calibrate: the setting of its sigma, and how many
  * numbers it has. */
-static const char *const part_sigmas[] = {"focal-sigma",        "baseline-sigma",
-                                          "camera-turn-sigma",  "centre-sigma",
-                                          "camera-place-sigma", "camera-clock-sigma"};
-static const uint8_t part_numbers[] = {1, 1, 3, 2, 3, 1};
+static const char *const part_sigmas[] = {
+    "focal-sigma",        "baseline-sigma",     "camera-turn-sigma", "centre-sigma",
+    "camera-place-sigma", "camera-clock-sigma", "wheel-scale-sigma", "wheel-track-sigma"};
+static const uint8_t part_numbers[] = {1, 1, 3, 2, 3, 1, 1, 1};
 enum { PARTS = sizeof part_numbers };
 
 static bool is_exact(const plr_config *config, unsigned part) {
@@ -223,11 +223,15 @@ static const char *contradiction(const plr_config *c, const char **culprit) {
          "landmark-prior = independent needs one above 0"},
         {c->process == PLR_PROCESS_IMU && (!body || !c->bias), "process",
          "imu needs model = body and bias = on"},
+        {c->process != PLR_PROCESS_IMU && c->wheel_scale_sigma > 0, "wheel-scale-sigma",
+         "goes with process = imu alone; elsewhere 0"},
+        {c->process != PLR_PROCESS_IMU && c->wheel_track_sigma > 0, "wheel-track-sigma",
+         "goes with process = imu alone; elsewhere 0"},
         {exact != NULL, exact, "calibrate lists what it belongs to, so it must be above 0"},
         {!has_room_for_calibration(c), "calibrate",
          "more numbers of the calibration are to be estimated, or have a sigma, than this build "
          "has room for: build it with PLR_MAX_CALIBRATION above " PLR_TEXT_OF(
-             PLR_MAX_CALIBRATION) ", up to 11"},
+             PLR_MAX_CALIBRATION) ", up to 13"},
         {!PLR_KNOWN_MAP && c->mode == PLR_MODE_LOCALIZATION, "mode", NO_KNOWN_MAP},
         {!PLR_KNOWN_MAP && c->known_map, "known-map", NO_KNOWN_MAP},
         {!PLR_SUPERVISE && c->scene != PLR_SCENE_STANDS, "scene",

@@ -9,12 +9,18 @@
 #ifndef PLR_SENSOR_MEASUREMENT_H
 #define PLR_SENSOR_MEASUREMENT_H
 
+#include <stdbool.h>
+
 #include "state/rows.h"
 
 typedef struct plr_measurement {
     plr_rows H;           /* derivative by the state's error */
     plr_real r[PLR_ROWS]; /* measured minus predicted: H x + N(0, R) */
     plr_real R[PLR_ROWS]; /* variances of the noise, independent from row to row */
+
+    /* Of a wheel's reading: r is H x + by_wheel s + noise, s the errors of the wheels. */
+    plr_by_wheel by_wheel;
+    bool of_wheel;
 
     /* Added to d^2 in the gate: a squared error, in units of sigma^2, that does not depend on the
      * state (of a stereo pair, the gap between its rows). */

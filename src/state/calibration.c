@@ -34,16 +34,19 @@ static void fill_variances(const plr_config *c, plr_real variance[PLR_CALIBRATIO
     }
     variance[PLR_CENTRE_X] = variance[PLR_CENTRE_Y] = squared(c->centre_sigma_px);
     variance[PLR_CAMERA_CLOCK] = squared(c->camera_clock_sigma_s);
+    variance[PLR_WHEEL_SCALE] = squared(c->wheel_scale_sigma);
+    variance[PLR_WHEEL_TRACK] = squared(c->wheel_track_sigma);
 }
 
 /* The part of the calibration, and so of the setting calibrate, that an error belongs to. */
 static const uint8_t part_of[PLR_CALIBRATION_ERRORS] = {
-    [PLR_BASELINE] = PLR_CALIBRATE_BASELINE,    [PLR_FOCAL_LENGTH] = PLR_CALIBRATE_FOCAL,
-    [PLR_CAMERA_TURN_X] = PLR_CALIBRATE_TURN,   [PLR_CAMERA_TURN_Y] = PLR_CALIBRATE_TURN,
-    [PLR_CAMERA_TURN_Z] = PLR_CALIBRATE_TURN,   [PLR_CENTRE_X] = PLR_CALIBRATE_CENTRE,
-    [PLR_CENTRE_Y] = PLR_CALIBRATE_CENTRE,      [PLR_CAMERA_PLACE_X] = PLR_CALIBRATE_PLACE,
-    [PLR_CAMERA_PLACE_Y] = PLR_CALIBRATE_PLACE, [PLR_CAMERA_PLACE_Z] = PLR_CALIBRATE_PLACE,
-    [PLR_CAMERA_CLOCK] = PLR_CALIBRATE_CLOCK,
+    [PLR_BASELINE] = PLR_CALIBRATE_BASELINE,       [PLR_FOCAL_LENGTH] = PLR_CALIBRATE_FOCAL,
+    [PLR_CAMERA_TURN_X] = PLR_CALIBRATE_TURN,      [PLR_CAMERA_TURN_Y] = PLR_CALIBRATE_TURN,
+    [PLR_CAMERA_TURN_Z] = PLR_CALIBRATE_TURN,      [PLR_CENTRE_X] = PLR_CALIBRATE_CENTRE,
+    [PLR_CENTRE_Y] = PLR_CALIBRATE_CENTRE,         [PLR_CAMERA_PLACE_X] = PLR_CALIBRATE_PLACE,
+    [PLR_CAMERA_PLACE_Y] = PLR_CALIBRATE_PLACE,    [PLR_CAMERA_PLACE_Z] = PLR_CALIBRATE_PLACE,
+    [PLR_CAMERA_CLOCK] = PLR_CALIBRATE_CLOCK,      [PLR_WHEEL_SCALE] = PLR_CALIBRATE_WHEEL_SCALE,
+    [PLR_WHEEL_TRACK] = PLR_CALIBRATE_WHEEL_TRACK,
 };
 
 void plr_calibration_lay_out(plr_error_columns *to, const plr_config *config) {
@@ -67,16 +70,12 @@ void plr_calibration_lay_out(plr_error_columns *to, const plr_config *config) {
 
 /* The column of the camera's clock, or count. */
 static unsigned column_of_clock(const plr_camera_model *camera) {
-    unsigned k = 0;
-    while (k < camera->errors.count && camera->errors.kind[k] != PLR_CAMERA_CLOCK)
-        k++;
-    return k;
+    return plr_calibration_column(&camera->errors, PLR_CAMERA_CLOCK);
 }
 
 /* By how much later than its stamp a picture was taken, s. */
 static plr_real offset_of_clock(const plr_camera_model *camera) {
-    const unsigned clock = column_of_clock(camera);
-    return clock < camera->errors.count ? camera->estimate.moved[clock] : PLR_R(0);
+    return plr_calibration_moved(camera, PLR_CAMERA_CLOCK);
 }
 
 /* By its clock the camera was elsewhere: q(t + tau) = Exp(-tau u) q(t), u its mean twist over tau. */
@@ -261,7 +260,8 @@ void plr_calibration_correct(plr_camera_model *camera, const plr_real *ds) {
     plr_real by[PLR_CALIBRATION_ERRORS] = {0}, turn[9], before[9], t[3];
     for (unsigned k = 0; k < plr_calibration_estimated(&camera->errors); k++) {
         const unsigned kind = camera->errors.kind[k];
-        const bool share = kind == PLR_BASELINE || kind == PLR_FOCAL_LENGTH;
+        const bool share = kind == PLR_BASELINE || kind == PLR_FOCAL_LENGTH ||
+                           kind == PLR_WHEEL_SCALE || kind == PLR_WHEEL_TRACK;
         by[kind] = ds[k];
         c->moved[k] += share ? PLR_FMA(c->moved[k], ds[k], ds[k]) : ds[k];
     }

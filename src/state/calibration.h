@@ -25,6 +25,20 @@ static inline unsigned plr_calibration_estimated(const plr_error_columns *errors
     return PLR_MAX_CALIBRATION > 0 ? errors->estimated : 0U;
 }
 
+/* The column of S of this kind of error; errors->count: it has none. */
+static inline unsigned plr_calibration_column(const plr_error_columns *errors, unsigned kind) {
+    unsigned k = 0;
+    while (k < errors->count && errors->kind[k] != kind)
+        k++;
+    return k;
+}
+
+/* By how much it has been corrected: 0 where it has no column. */
+static inline plr_real plr_calibration_moved(const plr_camera_model *camera, unsigned kind) {
+    const unsigned k = plr_calibration_column(&camera->errors, kind);
+    return k < camera->errors.count ? camera->estimate.moved[k] : PLR_R(0);
+}
+
 /* Lays out the columns of S by the settings. */
 void plr_calibration_lay_out(plr_error_columns *to, const plr_config *config);
 

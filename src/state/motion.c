@@ -72,8 +72,14 @@ void plr_motion_transpose(const plr_real K[PLR_MOTION_BY], plr_real Kt[PLR_MOTIO
             Kt[PLR_POSE_DIM * d + k] = K[PLR_DRIVERS * k + d];
 }
 
+/* How a prior is wider than B P_dd B^T + Q. */
+typedef struct plr_widened {
+    plr_real all, noise; /* both parts, or Q besides, so many times */
+    plr_real way2, turn2;
+} plr_widened;
+
 static void fill_prior(const plr_belief *belief, const plr_motion *motion, plr_noise *noise,
-                       plr_applied_motion *applied, plr_real scale, plr_real way2, plr_real turn2) {
+                       plr_applied_motion *applied, const plr_widened *by) {
     plr_real BPB[PLR_POSE_SQUARE], M[PLR_POSE_SQUARE];
     memset(noise->range_shift, 0, sizeof noise->range_shift);
     memset(applied, 0, sizeof *applied);
@@ -83,9 +89,9 @@ static void fill_prior(const plr_belief *belief, const plr_motion *motion, plr_n
         return;
     plr_motion_covariance_by_state(belief, motion, BPB);
     for (int i = 0; i < PLR_POSE_SQUARE; i++)
-        M[i] = scale * (PLR_FMA(SHARE_OF_STATE, BPB[i], BPB[i]) + motion->Q[i]);
+        M[i] = by->all * (PLR_FMA(SHARE_OF_STATE, BPB[i], BPB[i]) + by->noise * motion->Q[i]);
     for (int i = 0; i < PLR_POSE_DIM; i++)
-        M[(PLR_POSE_DIM + 1) * i] += i < 3 ? way2 : turn2;
+        M[(PLR_POSE_DIM + 1) * i] += i < 3 ? by->way2 : by->turn2;
     plr_factor6(applied->L, M);
     memcpy(applied->JL, applied->L, sizeof applied->JL);
 }
@@ -93,7 +99,10 @@ static void fill_prior(const plr_belief *belief, const plr_motion *motion, plr_n
 void plr_motion_prior(const plr_belief *belief, const plr_motion *motion, plr_noise *noise,
                       plr_real weight, plr_applied_motion *applied) {
     PLR_ASSERT(weight >= PLR_R(1));
-    fill_prior(belief, motion, noise, applied, weight * weight, 0, 0);
+    const bool inertial = plr_has_block(belief, PLR_BLOCK_VELOCITY);
+    const plr_widened by = {.all = inertial ? PLR_R(1) : weight * weight,
+                            .noise = inertial ? weight * weight : PLR_R(1)};
+    fill_prior(belief, motion, noise, applied, &by);
 }
 
 /* What an open prior adds: 0.3 m and 0.1 rad, squared. */
@@ -102,7 +111,8 @@ void plr_motion_prior(const plr_belief *belief, const plr_motion *motion, plr_no
 
 void plr_motion_open_prior(const plr_belief *belief, const plr_motion *motion, plr_noise *noise,
                            plr_applied_motion *applied) {
-    fill_prior(belief, motion, noise, applied, PLR_R(900), OPEN_WAY, OPEN_TURN);
+    static const plr_widened open = {PLR_R(900), PLR_R(1), OPEN_WAY, OPEN_TURN};
+    fill_prior(belief, motion, noise, applied, &open);
 }
 
 void plr_motion_open_velocity(const plr_belief *belief, plr_motion *motion) {
@@ -119,6 +129,18 @@ void plr_motion_open_velocity(const plr_belief *belief, plr_motion *motion) {
             m->Q_nc[PLR_REST_DIM * (3 + i) + j] += OPEN_TURN * W[3 * j + i];
             m->Q_cc[PLR_REST_DIM * i + j] += OPEN_TURN * plr_dot3(W + 3 * i, W + 3 * j);
         }
+    }
+}
+
+void plr_motion_widen_velocity(const plr_belief *belief, plr_motion *motion, plr_real weight) {
+    plr_core_motion *m = &motion->core;
+    if (!plr_has_block(belief, PLR_BLOCK_VELOCITY) || !(weight > 1))
+        return;
+    for (unsigned j = 0; j < PLR_VELOCITY_DIM; j++) {
+        for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+            m->Q_nc[PLR_REST_DIM * i + j] *= weight * weight;
+        for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
+            m->Q_cc[PLR_REST_DIM * i + j] *= weight * weight;
     }
 }
 

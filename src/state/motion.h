@@ -39,7 +39,8 @@ void plr_motion_by_drivers(const plr_belief *belief, const plr_motion *motion,
 /* Kt = K^T, drivers x 6. */
 void plr_motion_transpose(const plr_real K[PLR_MOTION_BY], plr_real Kt[PLR_MOTION_BY]);
 
-/* The motion at nu = 0: D' = D, with the odometry's sigmas times `weight`. */
+/* The motion at nu = 0: D' = D, with the odometry's sigmas times `weight`: of an IMU those of its readings alone, for
+ * what is known of the velocity is no reading. */
 void plr_motion_prior(const plr_belief *belief, const plr_motion *motion, plr_noise *noise,
                       plr_real weight, plr_applied_motion *applied);
 
@@ -52,6 +53,11 @@ void plr_motion_open_prior(const plr_belief *belief, const plr_motion *motion, p
  * velocity's share of the pending motion's noise by what white noise of the readings does that makes 0.3 m of the way in T
  * seconds, (3/T^2) (0.3 m)^2 with a covariance of (3/2T) (0.3 m)^2, and turns it by the 0.1 rad. */
 void plr_motion_open_velocity(const plr_belief *belief, plr_motion *motion);
+
+/* The same for plr_motion_prior with a weight: the readings' noise is so many times larger, and moves the velocity as it
+ * moves the pose. A gyro without weight does not aim the accelerometers. It becomes no
+ * less certain than the open prior makes it. */
+void plr_motion_widen_velocity(const plr_belief *belief, plr_motion *motion, plr_real weight);
 
 /* The same motion taken at nu = z. `prior` is from plr_motion_prior. */
 void plr_motion_at(const plr_motion *motion, const plr_applied_motion *prior,

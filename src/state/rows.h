@@ -27,6 +27,11 @@ typedef struct plr_twist_rows {
     plr_real R[PLR_ROWS]; /* variances */
 } plr_twist_rows;
 
+/* The derivative of three rows by the errors of the wheels: scale, track. */
+typedef struct plr_by_wheel {
+    plr_real error[2][PLR_ROWS];
+} plr_by_wheel;
+
 /* Adds a block: sets where it is, and returns its H, which the caller fills. */
 static inline plr_real *plr_rows_add(plr_rows *rows, unsigned row, unsigned columns) {
     plr_term *term = &rows->term[rows->terms++];

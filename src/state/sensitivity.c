@@ -61,7 +61,8 @@ void plr_sensitivity_move_range(plr_belief *belief, const plr_camera_model *came
     PLR_ASSERT(camera->errors.count == belief->layout.errors);
     for (unsigned k = 0; k < belief->layout.errors; k++) {
         const unsigned kind = camera->errors.kind[k];
-        const bool is_way = kind >= PLR_CAMERA_PLACE_X; /* it moves a point by its inverse range */
+        const bool is_way = kind >= PLR_CAMERA_PLACE_X &&
+                            kind <= PLR_CAMERA_CLOCK; /* it moves a point by its inverse range */
         plr_real *w = belief->S[k] + plr_covariance_row(belief, slot);
         if (k >= plr_calibration_estimated(&camera->errors) && !is_way)
             continue;
@@ -197,10 +198,14 @@ void plr_sensitivity_add_to_velocity(const plr_belief *belief, const plr_camera_
 }
 
 void plr_sensitivity_add_to_rows(const plr_belief *belief, const plr_camera_model *camera,
-                                 const plr_rows *J, plr_real C[9]) {
+                                 const plr_rows *J, const plr_by_wheel *H_s, plr_real C[9]) {
     plr_by_error y;
-    for (unsigned k = 0; k < belief->layout.errors; k++)
+    for (unsigned k = 0; k < belief->layout.errors; k++) {
+        const unsigned kind = camera->errors.kind[k];
         plr_rows_apply(J, belief->S[k], y[k]);
+        for (unsigned i = 0; H_s && kind >= PLR_WHEEL_SCALE && i < PLR_ROWS; i++)
+            y[k][i] += H_s->error[kind - PLR_WHEEL_SCALE][i];
+    }
     add_told(camera, PLR_ROWS, y, C);
 }
 

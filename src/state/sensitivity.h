@@ -74,9 +74,10 @@ void plr_sensitivity_add_to_pose(const plr_belief *belief, const plr_camera_mode
 void plr_sensitivity_add_to_velocity(const plr_belief *belief, const plr_camera_model *camera,
                                      const plr_motion *motion, plr_real P_u[PLR_POSE_SQUARE]);
 
-/* The same of a linear function of the state: C = J P J^T (3x3) gains J S Sigma S^T J^T. */
+/* The same of a linear function of the state: C = J P J^T (3x3) gains J S Sigma S^T J^T; with H_s, of a
+ * wheel's reading, (J S + H_s) Sigma (J S + H_s)^T. */
 void plr_sensitivity_add_to_rows(const plr_belief *belief, const plr_camera_model *camera,
-                                 const plr_rows *J, plr_real C[9]);
+                                 const plr_rows *J, const plr_by_wheel *H_s, plr_real C[9]);
 
 /* False after a correction that went wrong. */
 bool plr_sensitivity_is_finite(const plr_belief *belief);

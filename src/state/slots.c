@@ -88,7 +88,7 @@ bool plr_slots_export(const plr_belief *belief, const plr_camera_model *camera,
     plr_real P[9];
     plr_model_of(belief)->in_world(belief, camera, motion, s, &point);
     plr_covariance_of_rows(belief, &point.J, P);
-    plr_sensitivity_add_to_rows(belief, camera, &point.J, P);
+    plr_sensitivity_add_to_rows(belief, camera, &point.J, NULL, P);
     landmark->id = s->id;
     landmark->times_seen = s->times_seen;
     landmark->times_gated = s->times_gated;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "math/dense.h"
+#include "math/leaky.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
@@ -241,7 +242,7 @@ static void learn_agreement(plr_supervisor *s) {
     const plr_real keeps = plr_limit(s, PLR_LIMIT_BEFORE_KEEPS);
     const bool agrees = s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
     if (agrees || s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE))
-        s->agreement = PLR_FMA(keeps, s->agreement, agrees ? PLR_R(1) - keeps : PLR_R(0));
+        s->agreement = plr_leaky_sum(s->agreement, keeps, agrees ? PLR_R(1) - keeps : PLR_R(0));
 }
 
 plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,
@@ -278,11 +279,14 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
 }
 
 void plr_odometry_weigh(plr_supervisor *s, plr_real excess) {
+    const plr_real keeps = plr_limit(s, PLR_LIMIT_SUM_KEEPS);
+    const plr_real before = s->slips ? PLR_R(0) : PLR_FMA(s->weight, s->weight, -PLR_R(1));
     s->weight = 1;
-    if (!s->slips || !plr_doubt_contradicted(s))
+    if (!plr_doubt_contradicted(s))
         return;
     const plr_real now = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
-    const plr_real most = now > excess ? now : excess;
-    s->weight = PLR_SQRT(PLR_FMA(plr_limit(s, PLR_LIMIT_WEIGHT_LOST), most, PLR_R(1)));
+    const plr_real lost = plr_limit(s, PLR_LIMIT_WEIGHT_LOST) * (now > excess ? now : excess);
+    const plr_real fades = keeps * keeps * before;
+    s->weight = PLR_SQRT((lost > fades ? lost : fades) + PLR_R(1));
     PLR_ASSERT(s->weight >= 1);
 }

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "math/leaky.h"
 #include "supervise/limits.h"
 #include "supervise/supervise.h"
 
@@ -51,6 +52,14 @@ bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
     return !s->frozen;
 }
 
+/* One that was seen to repeat at once is but a frame that is missing: the odometry bridges it. */
+bool plr_pictures_misled(const plr_supervisor *s) {
+    bool used = false;
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        used = used || s->frozen_variance[k] > 0 || s->frozen_motion[k] * s->frozen_motion[k] > 0;
+    return s->frozen && used;
+}
+
 /* ---------------------------------------------------------------- the gate */
 
 bool plr_pictures_reject_all(const plr_supervisor *s, unsigned matched, unsigned gated) {
@@ -94,8 +103,8 @@ uint32_t plr_pictures_add(plr_supervisor *s, const plr_report *report, plr_time_
     s->matches_since_gated = report->gated ? 0 : s->matches_since_gated + report->matched;
     if (s->matches_since_gated > inert)
         s->matches_since_gated = inert;
-    s->nis = PLR_FMA(NIS_KEEPS, s->nis, (plr_real)report->nis);
-    s->nis_dof = PLR_FMA(NIS_KEEPS, s->nis_dof, (plr_real)report->nis_dof);
+    s->nis = plr_leaky_sum(s->nis, NIS_KEEPS, (plr_real)report->nis);
+    s->nis_dof = plr_leaky_sum(s->nis_dof, NIS_KEEPS, (plr_real)report->nis_dof);
     if (report->used < plr_limit_count(s, PLR_LIMIT_FEW))
         reasons |= PLR_REASON_FEW_OBSERVATIONS;
     const bool late =

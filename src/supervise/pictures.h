@@ -6,6 +6,9 @@
 
 #include "pelorus/supervisor.h"
 
+/* True if the picture repeats an older one, and others that did so were used before the body was seen to have moved. */
+bool plr_pictures_misled(const plr_supervisor *s);
+
 /* True if the gate rejects nearly all of a frame. */
 bool plr_pictures_reject_all(const plr_supervisor *s, unsigned matched, unsigned gated);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "supervise/readings.h"
 
+#include "math/leaky.h"
 #include "supervise/limits.h"
 #include "supervise/supervise.h"
 
@@ -17,8 +18,8 @@ void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned num
     plr_sensor_record *of = &s->sensors[reading->sensor - 1];
     const plr_real n = (plr_real)numbers, most = PLR_FMA(MOST_TIMES, n, MOST_PLUS);
     of->rejected = used ? 0 : (uint16_t)(of->rejected + (of->rejected < UINT16_MAX));
-    of->excess = PLR_FMA(KEEPS, of->excess, (d2 < most ? d2 : most) - n);
-    of->numbers = PLR_FMA(KEEPS, of->numbers, n);
+    of->excess = plr_leaky_sum(of->excess, KEEPS, (d2 < most ? d2 : most) - n);
+    of->numbers = plr_leaky_sum(of->numbers, KEEPS, n);
     /* the variance of `excess`, 2 n / (1 - KEEPS^2), is about `numbers` when that is full */
     const plr_real variance = of->numbers > FULL_SUM * n ? of->numbers : FULL_SUM * n;
     const plr_real limit = plr_limit(s, of->off ? PLR_LIMIT_SENSOR_BELOW : PLR_LIMIT_SENSOR_ABOVE);

@@ -4,14 +4,15 @@
 #include <string.h>
 
 #include "math/dense.h"
+#include "math/leaky.h"
 #include "math/small.h"
 
 void plr_sum_add(plr_sum *sum, plr_real keep, const plr_real x[PLR_POSE_DIM],
                  const plr_real C[PLR_POSE_TRIANGLE]) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        sum->sum[k] = PLR_FMA(keep, sum->sum[k], x[k]);
+        sum->sum[k] = plr_leaky_sum(sum->sum[k], keep, x[k]);
     for (unsigned k = 0; k < PLR_POSE_TRIANGLE; k++)
-        sum->variance[k] = PLR_FMA(keep * keep, sum->variance[k], C[k]);
+        sum->variance[k] = plr_leaky_sum(sum->variance[k], keep * keep, C[k]);
 }
 
 /* U^T U = D V D + floor I; D may be NULL. */

@@ -66,8 +66,8 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
     if (e->outright && !s->outright)
         s->outright_ns = e->now_ns;
     decision.wait = e->outright && !plr_doubt_contradicted(s) && !is_confirmed(s, e->now_ns);
-    /* a frame that rejects nearly all neither confirms nor denies */
-    const bool denies = !plr_pictures_reject_all(s, e->matched, e->gated);
+    /* a frame that rejects nearly all, or repeats the last, neither confirms nor denies */
+    const bool denies = !s->frozen && !plr_pictures_reject_all(s, e->matched, e->gated);
     s->outright = e->outright || (s->outright && !denies);
     s->waits = decision.wait;
     s->holds_biases = 0;
@@ -147,7 +147,7 @@ static void change_doubt(plr_supervisor *s, const plr_odometry_verdict *o, bool 
     } else if (s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW)) {
         plr_doubt_change(s, PLR_DOUBT_RETURNS);
     }
-    if (lost || s->frozen)
+    if (lost || plr_pictures_misled(s))
         lose(s);
 }
 
@@ -164,7 +164,7 @@ static void settle(plr_supervisor *s, plr_frame_decision *decision) {
 }
 
 static void count_doubt(plr_supervisor *s, bool lost, const plr_report *report) {
-    const bool event = lost || s->frozen || plr_doubt_contradicted(s);
+    const bool event = lost || plr_pictures_misled(s) || plr_doubt_contradicted(s);
     const bool agrees = !lost && !s->frozen && s->doubt != PLR_DOUBT_DEPARTED && !s->outright &&
                         report->used >= plr_limit_count(s, PLR_LIMIT_FEW) &&
                         s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);

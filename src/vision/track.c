@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "math/leaky.h"
 #include "math/small.h"
 #include "vision/patch.h"
 
@@ -227,7 +228,7 @@ static void learn_slope(const plr_vision *v, const plr_scene *s, const uint8_t *
         return;
     plr_real *all = t->slope_info;
     for (int i = 0; i < 3; i++)
-        info[i] *= SLOPE_SHARE, all[i] = PLR_FMA(SLOPE_KEEP, all[i], info[i]);
+        info[i] *= SLOPE_SHARE, all[i] = plr_leaky_sum(all[i], SLOPE_KEEP, info[i]);
     const plr_real x = PLR_FMA(info[0], change[0], info[1] * change[1]);
     const plr_real y = PLR_FMA(info[1], change[0], info[2] * change[1]);
     const plr_real det_all = PLR_FMA(all[0], all[2], -(all[1] * all[1]));

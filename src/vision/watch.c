@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "math/leaky.h"
 #include "math/small.h"
 
 /* Grey levels of a picture in which nothing is seen. */
@@ -101,11 +102,12 @@ void plr_watch_rows(plr_vision *v, const plr_expected_motion *m) {
     const unsigned n = m->known ? rows_of(v, m, &gap, &rate) : 0;
     if (n >= LEAST_TRACKS) {
         gap /= (plr_real)n, rate /= (plr_real)n;
-        g->count = PLR_FMA(KEEP, g->count, PLR_R(1));
-        g->rate = PLR_FMA(KEEP, g->rate, rate), g->gap = PLR_FMA(KEEP, g->gap, gap);
-        g->rate2 = PLR_FMA(KEEP, g->rate2, rate * rate);
-        g->gap_rate = PLR_FMA(KEEP, g->gap_rate, gap * rate);
-        g->gap2 = PLR_FMA(KEEP, g->gap2, gap * gap);
+        g->count = plr_leaky_sum(g->count, KEEP, PLR_R(1));
+        g->rate = plr_leaky_sum(g->rate, KEEP, rate);
+        g->gap = plr_leaky_sum(g->gap, KEEP, gap);
+        g->rate2 = plr_leaky_sum(g->rate2, KEEP, rate * rate);
+        g->gap_rate = plr_leaky_sum(g->gap_rate, KEEP, gap * rate);
+        g->gap2 = plr_leaky_sum(g->gap2, KEEP, gap * gap);
     }
     tell_delay(v);
 }

@@ -1,133 +1,24 @@
 // SPDX-License-Identifier: MIT
 /*
- * pelorus-bench [SECONDS_PER_LINE]: what a frame costs, beside a dense textbook EKF on OpenBLAS, in
- * one run, float32, one thread. A frame is predict, gate, update and retract with all N landmarks
+ * What a frame costs, float32, one thread. A frame is predict, gate, update and retract with all N landmarks
  * seen. It reports; it judges nothing.
+ *
+ * pelorus-bench [SECONDS_PER_LINE]          beside a dense textbook EKF on OpenBLAS, in one run
+ * pelorus-bench --floor [SECONDS_PER_LINE]  beside what the machine needs for the multiply-adds alone
+ * pelorus-bench --count N twist|imu         always the same frames, for a program that counts instructions
  */
-#define _POSIX_C_SOURCE 200112L
 #include <cblas.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
+#include <string.h>
 
+#include "floor.h"
 #include "pelorus/pelorus.h"
-#include "scene.h"
 #include "textbook.h"
+#include "timing.h"
 
 /* OpenBLAS's own, which Debian's cblas.h does not declare for every build. */
 void openblas_set_num_threads(int threads);
-
-enum { MAX_RUNS = 4000, MIN_RUNS = 9, WARM_UP = 3, TWISTS_A_FRAME = 10, READINGS_A_FRAME = 20 };
-
-static const plr_time_ns TWIST_NS = 1000000, READING_NS = 2500000; /* 400 Hz, 20 frames a second */
-
-typedef struct timing {
-    double us[MAX_RUNS];
-    unsigned count;
-    double total_us;
-} timing;
-
-static double now_us(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
-}
-
-static bool wants_more(const timing *t, double budget_us) {
-    return t->count < MIN_RUNS || (t->count < MAX_RUNS && t->total_us < budget_us);
-}
-
-static void add(timing *t, double us) {
-    t->us[t->count++] = us;
-    t->total_us += us;
-}
-
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Sorts the times; the share-th of them. */
-static double quantile(timing *t, double share) {
-    qsort(t->us, t->count, sizeof *t->us, ascending);
-    return t->us[(unsigned)(share * (double)(t->count - 1))];
-}
-
-static bool begin(plr_filter *filter, const scene *world, plr_process_kind process) {
-    static const plr_pose origin = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    static const double variance[3] = {1e-4, 1e-4, 1e-4};
-    plr_config config;
-    double v[3];
-    plr_config_default(&config);
-    config.slots = (uint16_t)(world->count > 0 ? world->count : 1);
-    config.bias = 1;
-    config.mode = world->count > 0 ? PLR_MODE_SLAM : PLR_MODE_DEAD_RECKONING;
-    config.pixel_sigma_px = 1;
-    config.process = (uint8_t)process;
-    if (plr_filter_init(filter, &world->calibration, &config, NULL) != PLR_OK)
-        return false;
-    if (process == PLR_PROCESS_TWIST)
-        return true;
-    const plr_time_ns t_ns = scene_time(world, 0) - READINGS_A_FRAME * READING_NS;
-    scene_velocity(world, t_ns, v);
-    return plr_filter_set_pose(filter, t_ns, &origin, NULL) == PLR_OK &&
-           plr_filter_set_velocity(filter, v, variance) == PLR_OK;
-}
-
-/* What comes between frames k - 1 and k; the last one falls on the frame. Returns when that began,
- * and in *ended when it ended; negative if one was refused. */
-static double move(plr_filter *filter, scene *world, plr_process_kind process, unsigned k,
-                   double *ended) {
-    const bool by_imu = process == PLR_PROCESS_IMU;
-    const plr_time_ns t_ns = scene_time(world, k), step_ns = by_imu ? READING_NS : TWIST_NS;
-    double started = -1;
-    for (unsigned i = by_imu ? READINGS_A_FRAME : TWISTS_A_FRAME; i-- > 0;) {
-        plr_twist twist;
-        plr_imu imu;
-        if (by_imu)
-            scene_imu(world, t_ns - i * step_ns, &imu);
-        else
-            scene_twist(world, k, &twist);
-        started = now_us();
-        const plr_status status = by_imu ? plr_filter_inertial(filter, t_ns - i * step_ns, &imu)
-                                         : plr_filter_predict(filter, t_ns - i * step_ns, &twist);
-        *ended = now_us();
-        if (status != PLR_OK)
-            return -1;
-    }
-    return started;
-}
-
-/* The filter at N landmarks: frames, each with the last step before it, into *frames; that step
- * alone, a twist or a reading of an IMU, into *steps. */
-static bool time_filter(unsigned n, plr_process_kind process, double budget_us, timing *frames,
-                        timing *steps) {
-    static plr_filter filter;
-    static scene world;
-    scene_init(&world, n);
-    if (!begin(&filter, &world, process))
-        return false;
-    frames->count = steps->count = 0;
-    frames->total_us = steps->total_us = 0;
-    for (unsigned k = 0; wants_more(frames, budget_us); k++) {
-        plr_frame frame;
-        plr_report report;
-        double moved = 0;
-        scene_frame(&world, k, &frame);
-        const double start = move(&filter, &world, process, k, &moved);
-        if (start < 0 || plr_filter_update(&filter, &frame, &report) != PLR_OK)
-            return false;
-        const double end = now_us();
-        const bool all_seen = n == 0 || report.matched == n;
-        if (k >= WARM_UP && all_seen) {
-            add(frames, end - start);
-            add(steps, moved - start);
-        }
-        if (k > 2 * MAX_RUNS)
-            return false; /* the scene does not hold what it promises */
-    }
-    return true;
-}
 
 static bool time_textbook(unsigned n, bool symmetric, double budget_us, timing *updates) {
     textbook t;
@@ -141,7 +32,7 @@ static bool time_textbook(unsigned n, bool symmetric, double budget_us, timing *
         good = textbook_update(&t);
         const double end = now_us();
         if (k >= WARM_UP)
-            add(updates, end - start);
+            add_run(updates, end - start);
     }
     textbook_free(&t);
     return good;
@@ -151,10 +42,10 @@ static const char *const title =
     "%5s | %21s | %9s | %21s | %9s | %21s | %21s | %s\n"
     "%5s | %10s %10s | %9s | %10s %10s | %9s | %10s %10s | %10s %10s | gemm, syrk\n";
 
-int main(int argc, char **argv) {
+static int beside_textbook(double seconds) {
     static const unsigned sizes[] = {16, 32, 50, 64, 100, 128, 256};
     static timing frames, predicts, by_imu, readings, gain, symmetric;
-    const double budget_us = 1e6 * (argc > 1 ? atof(argv[1]) : 1.0);
+    const double budget_us = 1e6 * seconds;
     openblas_set_num_threads(1);
 
     printf("pelorus %s, float%d, one thread; a frame with all N landmarks seen, bias on; an IMU at "
@@ -190,4 +81,26 @@ int main(int argc, char **argv) {
         fflush(stdout);
     }
     return EXIT_SUCCESS;
+}
+
+/* tests/python/test_instructions.py runs this under callgrind. */
+static int count(const char *landmarks, const char *process) {
+    static timing frames, steps;
+    const bool by_imu = strcmp(process, "imu") == 0;
+    const int n = atoi(landmarks);
+    if (n < 1 || n > PLR_MAX_LANDMARKS || !(by_imu || strcmp(process, "twist") == 0))
+        return EXIT_FAILURE;
+    return time_filter((unsigned)n, by_imu ? PLR_PROCESS_IMU : PLR_PROCESS_TWIST, 0, &frames,
+                       &steps)
+               ? EXIT_SUCCESS
+               : EXIT_FAILURE;
+}
+
+int main(int argc, char **argv) {
+    if (argc == 4 && strcmp(argv[1], "--count") == 0)
+        return count(argv[2], argv[3]);
+    const bool floor = argc > 1 && strcmp(argv[1], "--floor") == 0;
+    const int at = floor ? 2 : 1;
+    const double seconds = argc > at ? atof(argv[at]) : 1.0;
+    return floor ? beside_floor(seconds) : beside_textbook(seconds);
 }

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-WORDS = {"three": 3, "eleven": 11}
+WORDS = {"three": 3, "eleven": 11, "thirteen": 13}
 BYTES = {"U32": 4, "U64": 8}
 
 # What a pattern found, as what it says; a place says one thing, or each of its lines says the same.

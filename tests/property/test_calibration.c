@@ -19,10 +19,10 @@
 
 enum { RUNS = PELORUS_SHORT_FORM ? 3 : 12, FRAMES = PELORUS_SHORT_FORM ? 100 : 200 };
 enum { REST = PELORUS_SHORT_FORM ? 1000 : 4000 };
-enum { ERRORS = PLR_CALIBRATION_ERRORS, EVERYTHING = 63 };
+enum { ERRORS = PLR_WHEEL_SCALE, EVERYTHING = 63 };
 
-static double drawn[ERRORS]; /* what is to be corrected */
-static unsigned late;        /* readings by which frames are stamped late */
+static double drawn[PLR_CALIBRATION_ERRORS]; /* what is to be corrected */
+static unsigned late;                        /* readings by which frames are stamped late */
 
 void setUp(void) {
     plr_config *c = &imu_rig.config;

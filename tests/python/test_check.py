@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from converted import Run
+from draws import long_run
 from pelorus import inertial, wire
 from pelorus.check import (
     clock,
@@ -129,6 +130,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return simulate(tmp_path_factory, "--seed", "7", *noise, *rates)
 
 
+@long_run
 def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
     flown: Path, tmp_path: Path, pelorus: Run
 ) -> None:
@@ -403,6 +405,7 @@ def test_tracks_that_drift_are_told_from_white_noise() -> None:
     assert float(drifting.setting({"track-drift": f"{5 * due:.2f}"})["track-drift"]) == told
 
 
+@long_run
 def test_a_drive_whose_tracks_drift_is_honest_afterwards(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, pelorus: Run
 ) -> None:

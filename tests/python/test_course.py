@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
+from draws import long_run
 from drives import clean, npz_arrays, with_stale_tracks
 from pelorus import road
 from pelorus.converters import ece276a
@@ -192,6 +193,7 @@ def numbers(line: str) -> dict[str, Any]:
     return dict(zip(TITLES, (cell.strip() for cell in line.strip("|\n").split("|")), strict=True))
 
 
+@long_run
 def test_the_course_filter_is_what_the_report_says_on_03(
     pelorus: Command, real: Callable[[str], Path], plr_03: Path, tmp_path: Path
 ) -> None:

@@ -24,6 +24,7 @@ from pelorus.layout import Floats
 from pelorus.native import Precision
 from pelorus.schema import DEFAULTS, REASON_NAMES, REASONS, SETTINGS
 from pelorus.settings import IDS
+from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import messages_of, write_file
 from replay_drive import BIN
 
@@ -410,3 +411,11 @@ def test_whatever_comes_the_state_stays_finite_and_its_covariance_positive(
         assert (P == P.T).all()
         assert (np.linalg.eigvalsh(P) > 0).all()
     assert all(status < 0 for status in refused)
+
+
+def test_a_standstill_is_measured() -> None:
+    recording = simulate(Options(duration_s=1.0)).recording
+    filter = Filter.of_recording(list(recording.messages()))
+    filter.set_pose(0, np.eye(3), np.zeros(3))
+    filter.predict(7, [0, 0, 0], [0, 0, 0])
+    assert filter.measure(7, "standstill", [0, 0, 0], [0.01, 0.01, 0]).used

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from converted import Run
-from draws import draws
+from draws import draws, long_run
 from imu_drives import noisy
 from pelorus.replay import run_program
 from replay_drive import BIN
@@ -82,6 +82,7 @@ def figures(pelorus: Run, recording: Path, *options: object) -> dict[str, float]
 NEES = ("position", "rotation", "velocity", "bias_accel", "bias_gyro")
 
 
+@long_run
 @pytest.mark.parametrize(("slots", "metres", "degrees"), draws([(16, 0.12, 0.4), (60, 0.06, 0.15)]))
 def test_a_walk_through_a_corridor_drifts_by_centimetres(
     plr_imu: Callable[..., Path],

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from converted import Run
-from draws import draws
+from draws import draws, long_run
 from everyday import drawn
 from everyday import drive as everyday_drive
 from pelorus import se3
@@ -33,6 +33,7 @@ def turned(recording: Recording, degrees: float) -> Recording:
     return recording.with_extrinsic(T_CB)
 
 
+@long_run
 @pytest.mark.parametrize(("degrees", "told"), draws([(2.0, True), (0.0, False)]))
 def test_a_camera_that_is_turned_is_told(
     degrees: float, told: bool, tmp_path: Path, pelorus: Run

@@ -22,7 +22,7 @@ from pelorus.distribution import mixed_up
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
-EXTRAS = ("cv2", "PIL", "matplotlib", "rosbags", "pyproj", "pyulog")
+EXTRAS = ("cv2", "PIL", "matplotlib", "rosbags", "pyproj", "pyulog", "distributed", "duckdb")
 MOST_BYTES = 250e6  # of a plain install
 
 
@@ -92,6 +92,8 @@ def test_pip_puts_the_replay_on_the_path() -> None:
         ("vision", "from pelorus.tracking.images import unpacked; unpacked(Path(), b'')"),
         ("ros", "from pelorus.converters.bag import Bag; Bag(Path('/dev/null'))"),
         ("px4", "from pelorus.extras import extra\nwith extra('pyulog'):\n    import pyulog"),
+        ("fleet", "from pelorus.fleet.table import require_database; require_database()"),
+        ("fleet", "from pelorus.fleet.cluster import client_of; client_of(None, 1).__enter__()"),
         ("geodetic", "from pelorus.converters.geodetic import Ground; Ground().system()"),
     ],
 )

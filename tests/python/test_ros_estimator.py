@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import runpy
+import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from types import SimpleNamespace as Fields
@@ -19,8 +21,10 @@ from pelorus.online.diagnosis import Level, of_health
 from pelorus.simulation.imu import SimulatedImu
 from pelorus.simulation.simulate import Options as Drive
 from pelorus.simulation.simulate import simulate
+from pelorus_ros import conventions
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options, misspelt, table
+from replay_drive import BIN
 from robot_messages import (
     camera_info,
     driven,
@@ -209,6 +213,30 @@ def test_a_pose_from_rviz_places_the_robot(by_imu: tuple[Any, list[Message]]) ->
     assert told[0].covariance[5, 5] == pytest.approx(0.07, rel=0.2)
 
 
+def test_a_known_map_holds_what_wheels_lose(tmp_path: Path) -> None:
+    """Tracks by ids of an earlier run: its landmarks, and where in its world the robot starts."""
+    recording = simulate(Drive(seed=6, duration_s=20.0, landmarks=240)).recording
+    truth, messages = recording.truth, list(recording.messages())
+    first, mapped = tmp_path / "first.plr", tmp_path / "map.plr"
+    recording.write(first)
+    command = [BIN / "pelorus-replay", first, "--mode", "mapping", "--slots", "256", "--quiet"]
+    subprocess.run([*map(str, command), "--out", str(mapped)], check=True, capture_output=True)
+    usual = options(
+        motion="wheels",
+        base_frame="base_link",
+        initial_pose=[*truth.p[0], *conventions.quaternion(truth.R[0])],
+        settings=["bias-velocity-sigma=0.03", "bias-gyro-sigma=0.004"],  # as they are drawn
+    )
+    off = []
+    for known in ("", str(mapped)):
+        robot = Estimator(replace(usual, known_map=known))
+        last = driven(equipped(robot, recording.header, "base_link"), messages)[-1]
+        at = np.searchsorted(recording.truth_t_ns, last.estimate.t_ns)
+        off.append(np.linalg.norm(last.T_OB.p - truth.p[at]))
+        assert off[-1] < 4 * np.sqrt(np.trace(last.covariance[:3, :3]))
+    assert off[1] < 0.1 < off[0]
+
+
 # --- parameters -----------------------------------------------------------------------------------
 
 
@@ -233,6 +261,7 @@ def test_every_parameter_has_a_description_and_a_default_that_is_possible() -> N
         ("settings", ["pixel-sigma"], "name=value is expected"),
         ("settings", ["pixel-sigma=1e9"], "0.001 to 1000 px are possible"),
         ("log", "/no/such/drive.plr", "there is no such folder"),
+        ("known_map", "map.plr", "give tracks_type, and tracks whose ids are the map's"),
         ("sync_matching_threshold_ms", -1.0, "0 or more is possible"),
     ],
 )

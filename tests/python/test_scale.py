@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from converted import Run
-from draws import draws
+from draws import draws, long_run
 from everyday import drawn
 from everyday import drive as everyday_drive
 from pelorus.check import clock, scale, search, tuning, verdict
@@ -120,6 +120,7 @@ WALK = replace(
 )  # fmt: skip
 
 
+@long_run
 @pytest.mark.parametrize(
     ("speed_varies", "bias_mps", "error", "grade", "words"),
     draws(

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from draws import long_run
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,6 +53,7 @@ def folder_of_the_project(folder: Path) -> None:
     (folder / "build" / "bin").symlink_to(BIN.resolve())
 
 
+@long_run
 def test_the_page_does_what_it_says_command_by_command(tmp_path: Path) -> None:
     folder_of_the_project(tmp_path)
     path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from converted import Run
+from draws import long_run
 from numpy.typing import NDArray
 from pelorus import se3, trajectory, wire
 from pelorus.check.checked import Checked, check, config_text
@@ -463,6 +464,7 @@ def test_on_kitti_06_the_truth_begins_with_turns_that_the_pictures_do_not_show(
     assert 5 < abs(mrad[:MEASURED, 1].sum()) < 15
 
 
+@long_run
 def test_on_kitti_06_what_check_finds_covers_the_error(
     real: Callable[[str], Path], tmp_path: Path
 ) -> None:

@@ -98,7 +98,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.STATE: [57],
     Kind.READING: [58],
     Kind.IMU: [13 + 24 * n for n in (1, 20)],
-    Kind.CALIBRATION: [234],
+    Kind.CALIBRATION: [250],
 }
 
 
@@ -164,7 +164,7 @@ def test_a_frame_is_these_bytes() -> None:
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 7, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 8, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:211] == "Straße 7".encode()
     assert np.array_equal(np.frombuffer(header, "<f8", 6, 211), np.full(6, -1.0))
     assert header[259] == Process.TWIST

@@ -38,7 +38,7 @@ static void say(double speed_mps, bool due) {
 
 /* A step that begins within two intervals is held, one that begins after them is not. */
 static void demand_held_for_two_intervals(void) {
-    const plr_held_velocity *held = &rig.filter.source.either.velocities.held[0];
+    const plr_held_velocity *held = &rig.filter.source.velocities.held[0];
     TEST_ASSERT_EQUAL_UINT64(2 * interval_ns, held->until_ns - plr_filter_time(&rig.filter));
 }
 
@@ -67,7 +67,7 @@ static void test_nor_does_a_lost_one(void) {
 }
 
 static void test_the_first_one_after_a_pause_is_not_held(void) {
-    const plr_held_velocity *held = &rig.filter.source.either.velocities.held[0];
+    const plr_held_velocity *held = &rig.filter.source.velocities.held[0];
     begin();
     wait(8);
     say(0, true);
@@ -84,8 +84,8 @@ static void test_of_two_wheels_at_one_time_the_last_is_held(void) {
         say(0, true);
     }
     demand_held_for_two_intervals();
-    TEST_ASSERT_TRUE(rig.filter.source.either.velocities.held[0].z[0] == 0);
-    TEST_ASSERT_TRUE(rig.filter.source.either.velocities.held[0].density[0] > 0);
+    TEST_ASSERT_TRUE(rig.filter.source.velocities.held[0].z[0] == 0);
+    TEST_ASSERT_TRUE(rig.filter.source.velocities.held[0].density[0] > 0);
 }
 
 static void test_a_sensor_that_becomes_slower_is_held_for_two_of_its_new_intervals(void) {
@@ -94,6 +94,6 @@ static void test_a_sensor_that_becomes_slower_is_held_for_two_of_its_new_interva
         wait(2);
         say(0, true);
     }
-    const plr_held_velocity *held = &rig.filter.source.either.velocities.held[0];
+    const plr_held_velocity *held = &rig.filter.source.velocities.held[0];
     TEST_ASSERT_EQUAL_UINT64(4 * interval_ns, held->until_ns - plr_filter_time(&rig.filter));
 }

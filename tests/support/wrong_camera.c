@@ -16,7 +16,7 @@ void wrong_camera_draw(rng *chance, const plr_config *config, double error[ERROR
         config->centre_sigma_px,       config->camera_place_sigma_m,  config->camera_place_sigma_m,
         config->camera_place_sigma_m,  config->camera_clock_sigma_s};
     for (unsigned k = 0; k < ERRORS; k++)
-        error[k] = sigma[k] * rng_normal(chance);
+        error[k] = k < PLR_WHEEL_SCALE ? sigma[k] * rng_normal(chance) : 0;
 }
 
 plr_calibration wrong_camera(const plr_calibration *truth, const double error[ERRORS]) {

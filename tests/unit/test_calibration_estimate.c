@@ -146,7 +146,7 @@ static void test_what_is_considered_widens_what_is_estimated(void) {
     take_specimen(PLR_MODEL_BODY, PLR_CALIBRATE_FOCAL | PLR_CALIBRATE_TURN);
     const unsigned m = filter.camera.errors.count, estimated = filter.camera.errors.estimated;
     TEST_ASSERT_EQUAL_UINT(4, estimated);
-    TEST_ASSERT_EQUAL_UINT(PLR_CALIBRATION_ERRORS, m);
+    TEST_ASSERT_EQUAL_UINT(PLR_WHEEL_SCALE, m); /* those of the camera */
     (void)plr_correct(&filter, &filter.work.sightings, NULL, 0);
     wrong_camera_covariance(&filter, V);
     for (unsigned k = estimated; k < m; k++)

@@ -64,7 +64,7 @@ static void demand_found(size_t from, size_t to) {
 static void test_every_flipped_bit_of_what_outlives_a_call_is_found(void) {
     const size_t P = offsetof(plr_filter, belief.P);
     demand_found(0, sizeof sound.magic);
-    demand_found(offsetof(plr_filter, config), offsetof(plr_filter, source.either));
+    demand_found(offsetof(plr_filter, config), offsetof(plr_filter, source.alignment));
     demand_found(offsetof(plr_filter, motion), offsetof(plr_filter, belief.slots) +
                                                    sound.belief.count * sizeof *sound.belief.slots);
     demand_found(P, P + plr_packed_row(12 + 3 * sound.belief.count) * sizeof *sound.belief.P);

@@ -80,7 +80,7 @@ static void test_the_erased_value_does_not_matter(void) {
 }
 
 static void test_what_fills_the_last_units_is_zero(void) {
-    shelf_begin(2 * 8000, 8000, 100);
+    shelf_begin(2 * 9000, 9000, 100);
     shelf_saves(0);
     for (uint32_t at = PLR_STORE_HEADER; at < 100; at++)
         TEST_ASSERT_EQUAL_UINT8(0, flash.bytes[at]);

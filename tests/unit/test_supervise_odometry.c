@@ -342,9 +342,21 @@ static void test_biases_are_taught_nothing_until_it_is_settled_or_has_lasted_for
     for (unsigned k = 0; k < 800; k++) {
         e.events.lost_in_map = true;
         s.frozen = 1;
+        s.frozen_variance[0] = 1; /* repeats were used before the body was seen to move */
         held += add(nu, 0);
     }
     TEST_ASSERT_UINT_WITHIN(2, 600, held);
+}
+
+static void test_a_picture_that_was_seen_to_repeat_at_once_casts_no_doubt(void) {
+    const double nu[6] = {0};
+    add_agreement(BEFORE);
+    s.frozen = 1;
+    (void)add(nu, 0);
+    TEST_ASSERT_FALSE(is_said(MAY_BE_WRONG));
+    s.frozen_variance[0] = 1;
+    (void)add(nu, 0);
+    TEST_ASSERT_TRUE(is_said(MAY_BE_WRONG));
 }
 
 static void test_a_pose_that_is_set_is_in_no_doubt_and_one_found_anew_is(void) {

@@ -36,7 +36,11 @@ PARTS = (
         for axis in "xyz"
     ),
     CalibrationPart("clock", "camera's clock", "ms", 1000),
+    CalibrationPart("wheel_scale", "wheels' radius", "%", 100),
+    CalibrationPart("wheel_track", "distance between wheels", "%", 100),
 )
+OF_CAMERA = 11  # of these
+CLOCK = OF_CAMERA - 1
 MEANING = {
     f"calibrated_{part.key}{end}": f"{what} of the {part.name}, {part.unit}"
     for part in PARTS
@@ -46,15 +50,19 @@ MEANING = {
 
 @dataclass(frozen=True, eq=False)
 class Calibrated(Message, kind=Kind.CALIBRATION):
-    """The filter's calibration; `corrected` and `sigma` (11,) are in the order of PARTS."""
+    """The filter's calibration: `corrected` and `sigma` (11,), and behind them `wheels` and
+    `wheels_sigma` (2,), are in the order of PARTS.
+    """
 
     t_ns: int
     estimated: int  # bits
     camera: Camera
     R_CB: Floats = identity()
     t_CB_m: Floats = zeros(3)
-    corrected: Floats = zeros(len(PARTS))
-    sigma: Floats = zeros(len(PARTS))
+    corrected: Floats = zeros(OF_CAMERA)
+    sigma: Floats = zeros(OF_CAMERA)
+    wheels: Floats = zeros(len(PARTS) - OF_CAMERA)
+    wheels_sigma: Floats = zeros(len(PARTS) - OF_CAMERA)
 
     def values(self) -> dict[str, Any]:
         return super().values() | vars(self.camera)
@@ -66,9 +74,11 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
 
     def parts(self) -> Iterator[tuple[CalibrationPart, float, float]]:
         """Yields each estimated part with its correction and sigma, in the part's unit."""
+        corrected = np.concatenate((self.corrected, self.wheels))
+        sigma = np.concatenate((self.sigma, self.wheels_sigma))
         for k, part in enumerate(PARTS):
             if self.estimated >> k & 1:
-                yield part, self.corrected[k] * part.scale, self.sigma[k] * part.scale
+                yield part, corrected[k] * part.scale, sigma[k] * part.scale
 
     @property
     def figures(self) -> Figures:
@@ -82,7 +92,7 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
     @property
     def offset_s(self) -> float:
         """Returns the amount to add to the setting camera-offset, s."""
-        return float(self.corrected[-1]) if self.estimated >> len(PARTS) - 1 & 1 else 0.0
+        return float(self.corrected[CLOCK]) if self.estimated >> CLOCK & 1 else 0.0
 
 
 def last_calibrated(messages: Iterable[Message]) -> Calibrated | None:

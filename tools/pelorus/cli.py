@@ -31,6 +31,7 @@ COMMANDS = (
     "live",
     "stream",
     "compare",
+    "fleet",
 )
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C

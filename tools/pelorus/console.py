@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import track
+from rich.progress import Progress, track
 from rich.text import Text
 
 if TYPE_CHECKING:
@@ -138,6 +138,36 @@ def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iter
         if done:
             told.say(f"{label}, {done}{f' of {of}' if of else ''}")
         yield item
+
+
+@contextmanager
+def tally(what: str, count: int, weight: float) -> Iterator[Callable[[float], None]]:
+    """Yields a function that counts one of `count` as done, of this share of the whole weight.
+
+    Shows how many are done, and the time left: by weight, for they differ.
+    """
+    begun_s, done = told.clock(), 0
+    weighed = 0.0
+    with Progress(console=err, transient=True, disable=not err.is_terminal) as bar:
+        task = bar.add_task(f"{what}, 0 of {count}", total=weight)
+
+        def advance(share: float) -> None:
+            nonlocal done, weighed
+            done, weighed = done + 1, weighed + share
+            left_s = (told.clock() - begun_s) * (weight - weighed) / max(weighed, 1e-9)
+            words = f"{what}, {done} of {count}"
+            bar.update(task, completed=weighed, description=words)
+            told.say(f"{words}, about {spoken_time(left_s)} left")
+
+        yield advance
+
+
+def spoken_time(seconds: float) -> str:
+    """Returns `40 s`, `12 min` or `3 h 5 min`."""
+    minutes = round(seconds / 60)
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
 VERDICT_COLOURS = {"good": "green", "care": "yellow", "bad": "red"}

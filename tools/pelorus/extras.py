@@ -26,6 +26,8 @@ EXTRAS = {
     "pymavlink": ("MAVLink needs pymavlink", "mavlink"),
     "depthai": ("an OAK needs depthai", "oak"),
     "pyrealsense2": ("a RealSense needs pyrealsense2", "realsense"),
+    "distributed": ("a fleet needs Dask", "fleet"),
+    "duckdb": ("a fleet's table needs DuckDB", "fleet"),
     "pyproj": ("places on the earth need pyproj", "geodetic"),
 }
 

@@ -348,7 +348,7 @@ class Filter:
         sigmas = checked("sigma", sigma, (3,))
         reading = native.Reading(whole_number("t_ns", t_ns, MOST_NS), kinds[sensor])
         still = sensor == "standstill"
-        reading.axes = 7 if still else sum(1 << i for i in range(3) if sigmas[i] != 0)
+        reading.axes = sum(1 << i for i in range(2 if still else 3) if sigmas[i] != 0)
         reading.value[:], reading.sigma[:] = checked("value", value, (3,)), sigmas
         reading.at_B_m[:] = checked("at_B_m", at_B_m, (3,))
         result = ReadingResult()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -44,6 +45,14 @@ def find_programs(folder: Path | None) -> Programs:
         "package was installed without them, or for another system; install one that has them, "
         "or build them and name their folder with --bin or PELORUS_BIN"
     )
+
+
+def threads() -> int:
+    """Returns how many replays may run side by side: as many as there are processors.
+
+    $PELORUS_THREADS gives another number: of a fleet's workers each has one.
+    """
+    return int(os.environ.get("PELORUS_THREADS") or os.cpu_count() or 1)
 
 
 @dataclass(frozen=True)

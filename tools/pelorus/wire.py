@@ -305,7 +305,7 @@ def counted_messages_of(path: Path) -> tuple[list[Message], Counts]:
     counts = Counts()
     messages = [frame.message for frame in frames_in(path, counts)]
     if not counts.frames[Kind.HEADER]:
-        raise _without_header(path)
+        raise without_header(path)
     return messages, counts
 
 
@@ -336,8 +336,9 @@ def header_of(received: list[Received], path: Path) -> Header:
     for frame in received:
         if isinstance(frame.message, Header):
             return frame.message
-    raise _without_header(path)
+    raise without_header(path)
 
 
-def _without_header(path: Path) -> PelorusError:
+def without_header(path: Path) -> PelorusError:
+    """Returns the error of a file without the one frame that all others need."""
     return PelorusError(f"{path}: holds no HEADER frame; without the calibration it is of no use")

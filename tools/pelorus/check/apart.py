@@ -23,7 +23,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from os import cpu_count
 from pathlib import Path
 from typing import NamedTuple
 
@@ -37,7 +36,7 @@ from pelorus.console import progress
 from pelorus.evaluation import world_laid
 from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo, Twist
 from pelorus.layout import Floats
-from pelorus.replay import NothingUsefulError, stuffed_answers
+from pelorus.replay import NothingUsefulError, stuffed_answers, threads
 from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory, estimate_in
@@ -137,7 +136,7 @@ class Parts:
     def apart(self, settings: Settings) -> HalvesApart:
         """Returns how far apart halves are with these settings, by windows with enough data."""
         options = options_of({**settings, **SAME_CAMERA})
-        with ThreadPoolExecutor(cpu_count() or 1) as pool:
+        with ThreadPoolExecutor(threads()) as pool:
             ran = pool.map(lambda part: self._estimate(part, options), self._parts)
             estimates = list(progress(ran, "halves of the points", len(self._parts)))
         whole = {p.window: e for p, e in zip(self._parts, estimates, strict=True) if not p.way}

@@ -10,7 +10,6 @@ lie anywhere in the picture: otherwise the best settings would be those that rej
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -35,7 +34,7 @@ from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
 from pelorus.frames import Header, Kind, Message, Pose, Process, Report, Stereo
 from pelorus.layout import Floats, unpack_symmetric
-from pelorus.replay import stuffed_answers
+from pelorus.replay import stuffed_answers, threads
 from pelorus.schema import number
 from pelorus.trajectory import POSE_SIZE
 
@@ -125,7 +124,7 @@ class Bench:
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         for key in new:
             self._recording(dict(key))
-        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        with ThreadPoolExecutor(threads()) as pool:
             done = pool.map(self._replay, new)
             self._known.update(zip(new, progress(done, what, len(new)), strict=True))
         return [self._known[key] for key in keys]

@@ -197,12 +197,18 @@ class JudgedRun:
 
 def verdict_of_log(messages: Sequence[Message]) -> Verdict:
     """Judges a filter's result that contains the recording; no value in it raises an error."""
+    return judged_log(messages)[2]
+
+
+def judged_log(messages: Sequence[Message]) -> tuple[JudgedRun, Known, Verdict]:
+    """Returns the run, what its recording shows by itself, and the verdict on both."""
     with np.errstate(all="ignore"):
         run = JudgedRun.of(messages)
         try:
-            return verdict_of(run, known_of(messages))
+            known = known_of(messages)
+            return run, known, verdict_of(run, known)
         except np.linalg.LinAlgError:  # nothing can be fitted: judges the run alone
-            return verdict_of(run, Known())
+            return run, Known(), verdict_of(run, Known())
 
 
 def verdict_of(run: JudgedRun | None, known: Known) -> Verdict:

@@ -89,6 +89,21 @@ def live(
         help="For v4l2: a serial port that gives lines `ax ay az wx wy wz` in m/s^2 and rad/s, or "
         "with a time in s before them.",
     ),
+    wheels: str = typer.Option(
+        "",
+        metavar="udp:PORT|FILE.csv",
+        help="Speeds of wheels beside the IMU, datagrams of JSON or rows of a table: `v_mps`, or "
+        "`left_mps` and `right_mps`; `t_ns` or `t_s` on the camera's clock, else they are of now.",
+    ),
+    wheel_sigma: float = typer.Option(0.03, metavar="M/S", help="Noise of a speed."),
+    wheel_at: tuple[float, float, float] = typer.Option(
+        (0.0, 0.0, 0.0),
+        metavar="X Y Z",
+        help="The middle of their axle on the robot, m, as --mount.",
+    ),
+    wheel_track: float = typer.Option(
+        0.0, min=0.0, metavar="M", help="Distance from the left to the right wheel."
+    ),
     config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     check: bool = typer.Option(
@@ -103,6 +118,7 @@ def live(
     Ctrl-C ends it, and the log is whole. docs/LIVE.md has cameras, wiring and autopilots.
     """
     from pelorus.live.session import How, Session  # noqa: PLC0415 - scipy loads slowly
+    from pelorus.live.wheels import Beside, WheelsAsked  # noqa: PLC0415
 
     if origin is not None and mavlink is None:
         raise PelorusError("--origin is told to an autopilot: it needs --mavlink PORT")
@@ -119,6 +135,10 @@ def live(
             watch = stack.enter_context(watching(view)) if view is not None else None
             opened = open_camera(camera, asked)
             stack.callback(opened.close)
+            if wheels:
+                of_wheels = WheelsAsked(wheels, wheel_sigma, wheel_at, wheel_track)
+                opened = Beside(opened, of_wheels, mount)
+                stack.callback(opened.close)
             outputs = _outputs(mavlink, origin, udp)
             for output in outputs:
                 stack.callback(output.close)

@@ -23,6 +23,7 @@ from pelorus.frames import (
     Header,
     Imu,
     Kind,
+    Landmark,
     Message,
     Pose,
     Reading,
@@ -106,11 +107,13 @@ class Log:
 
 @dataclass(frozen=True)
 class Setup:
-    """What a drive begins with; `settings` win over what the HEADER suggests."""
+    """What a drive begins with; `settings` win over what the HEADER suggests. `known` is a map, for
+    the settings known-map and mode."""
 
     header: Header
     settings: Named
     precision: Precision = "float32"
+    known: tuple[Landmark, ...] = ()
 
 
 class Drive:
@@ -132,6 +135,7 @@ class Drive:
         wanted: list[Message] = [Header.unpack(setup.header.pack())]
         if asked:
             wanted.append(Config(asked))
+        wanted += [Landmark.unpack(one.pack()) for one in setup.known]
         self.filter = Filter.of_recording(wanted, precision=setup.precision)
         self.refused: dict[tuple[Kind, int], int] = {}
         self.log = None if log is None else Log(log)

@@ -13,7 +13,15 @@ from pelorus.frames import Reading
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.simulation import settings
-from pelorus.simulation.settings import BELOW_ONE, NOT_NEGATIVE, Numbers, require, setting
+from pelorus.simulation.settings import (
+    BELOW_ONE,
+    NOT_NEGATIVE,
+    PERCENT,
+    Numbers,
+    Span,
+    require,
+    setting,
+)
 from pelorus.small_sensors import Motion, SmallSensor
 
 OUTLIER_SIGMAS = 100.0  # largest error of an outlier
@@ -36,6 +44,19 @@ class Sensing:
     outliers: float = setting(
         0.0, "Share of them that are off by up to 100 sigma.", "SHARE", BELOW_ONE
     )
+
+    track_m: float = setting(0.0, "Two wheels, so far apart along the body's y; 0: one.", "M")
+    scale_percent: float = setting(
+        0.0, "The radius is so much larger than was told.", "PERCENT", PERCENT
+    )
+    track_percent: float = setting(
+        0.0, "The same of the distance between the wheels.", "PERCENT", PERCENT
+    )
+    slip_percent: float = setting(
+        0.0, "They slip, and turn by so much faster than they roll.", "PERCENT"
+    )
+    slip_from_s: float = setting(0.0, "They begin to slip then.", "S")
+    slip_for_s: float = setting(5.0, "They slip so long.", "S")
 
     def check(self, sensor: SmallSensor, twist_rate_hz: float) -> None:
         """Refuses contradictory options, by the option's name."""
@@ -70,6 +91,9 @@ class Sensing:
 def options_without_meaning(sensor: SmallSensor) -> set[str]:
     """Returns the fields of Sensing that this sensor ignores."""
     without = set() if sensor.has_arm else {"at_m"}
+    if sensor.name != "wheel":
+        without |= {"track_m", "scale_percent", "track_percent"}
+        without |= {"slip_percent", "slip_from_s", "slip_for_s"}
     return without | ({"outliers"} if sensor.at_rest else set())
 
 
@@ -82,13 +106,35 @@ def read(
     chance: np.random.Generator,
 ) -> list[Reading]:
     """Returns readings at each `every`-th time but the first: before it there is no pose yet."""
+    half_m = np.array([0.0, sensing.track_m / 2, 0.0])
+    sides = (1.0, -1.0) if sensing.track_m else (0.0,)
+    return [
+        reading
+        for side in sides
+        for reading in _read(sensor, sensing, t_ns, motion, every, chance, side * half_m)
+    ]
+
+
+def _read(
+    sensor: SmallSensor,
+    sensing: Sensing,
+    t_ns: Times,
+    motion: Motion,
+    every: int,
+    chance: np.random.Generator,
+    aside_m: Floats,
+) -> list[Reading]:
+    """Returns the readings of one that sits `aside_m` (3,) from the place of the options."""
     rows = np.arange(every, len(t_ns), every)
     if sensor.at_rest:
         rows = rows[_stays_at_rest(motion, every)[rows]]
     count, numbers = len(rows), len(sensor.columns)
-    arm = np.array(sensing.at_m or (0.0, 0.0, 0.0))
+    arm = np.array(sensing.at_m or (0.0, 0.0, 0.0)) + aside_m
     sigma = sensing.sigma_of(sensor)
-    true = sensor.measure(motion.at(rows), arm)
+    true = sensor.measure(motion.at(rows), arm + sensing.track_percent / 100 * aside_m)
+    slips = Span(sensing.slip_from_s, sensing.slip_for_s).holds(t_ns[rows] - t_ns[0])
+    true = true / (1 + sensing.scale_percent / 100)
+    true = np.where(slips[:, None], (1 + sensing.slip_percent / 100) * true, true)
     noise = sigma * chance.standard_normal((count, numbers))
     wrong = chance.random(count) < sensing.outliers
     astray = OUTLIER_SIGMAS * sigma * chance.uniform(-1.0, 1.0, (count, numbers))

@@ -19,6 +19,7 @@ from pelorus import schema
 from pelorus.converters import ros_frames
 from pelorus.errors import PelorusError, write_text
 from pelorus.frames import Imu, Reading, Twist
+from pelorus.known_map import known_map
 from pelorus.layout import Floats
 from pelorus.online import diagnosis
 from pelorus.online.diagnosis import Status
@@ -64,6 +65,7 @@ class Estimator:
         self.faults: dict[str, str] = {}  # of messages that could not be read, by topic
         self.rigged: Rigged | None = None
         self._size: tuple[int, int] = (0, 0)
+        self._known = known_map(Path(options.known_map)) if options.known_map else ()
         self._given: Given | None = self._initial()
         self._before: Counter[str] = Counter()
 
@@ -263,7 +265,10 @@ class Estimator:
             if self.odometry is None:
                 options = self.options
                 setup = Setup(
-                    rigged.calibrated.header, options.filter_settings(), options.filter_precision
+                    rigged.calibrated.header,
+                    options.filter_settings(),
+                    options.filter_precision,
+                    self._known,
                 )
                 log = Path(options.log) if options.log else None
                 self.pipeline.odometry = Odometry(setup, rigged.T_IB, log, self._given)

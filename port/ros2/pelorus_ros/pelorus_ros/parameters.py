@@ -97,6 +97,11 @@ class Options:
         [0.0], "x y z qx qy qz qw of the base in odom at the start; one 0: the origin, looking at x"
     )
     initial_pose_sigma: list[float] = parameter([0.01, 0.01], "of initial_pose: m, rad")
+    known_map: str = parameter(
+        "",
+        "known landmarks, of pelorus-replay --out map.plr, by the ids of the topic tracks; "
+        "their world is odom, and initial_pose says where in it the base starts",
+    )
     log: str = parameter("", "recording of all that is used, drive.plr(.zst); replays to the bit")
     state_file: str = parameter("", "file of the services save_state and load_state")
     moved_sigma: list[float] = parameter(
@@ -137,6 +142,13 @@ class Options:
                 f"parameter sync_matching_threshold_ms: {self.sync_matching_threshold_ms}; "
                 "0 or more is possible"
             )
+        if self.known_map and not self.tracks_type:
+            raise PelorusError(
+                "parameter known_map: a point that is followed here has a new id in every run; "
+                "give tracks_type, and tracks whose ids are the map's"
+            )
+        if self.known_map and len(self.initial_pose) != 7:
+            raise PelorusError("parameter known_map: where in it? initial_pose is expected, too")
         if self.log and not Path(self.log).parent.is_dir():
             raise PelorusError(f"parameter log: {self.log}: there is no such folder")
         self.filter_settings()
@@ -158,7 +170,7 @@ class Options:
                 raise PelorusError(f"parameter settings: {pair!r}; name=value is expected")
             found[name] = _number_or_word(value)
             Configured(library(self.filter_precision)).set(name, found[name])
-        return found
+        return ({"known-map": "on"} if self.known_map else {}) | found
 
 
 def _number_or_word(value: str) -> float | str:

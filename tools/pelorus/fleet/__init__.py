@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus fleet`: check, evaluate and explain over hundreds of recordings."""

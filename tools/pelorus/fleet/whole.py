@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""Adds up what the pieces of one log tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pelorus.check.known import Known
+from pelorus.check.verdict import Grade, Verdict, judged_log
+from pelorus.consistency import Figures
+from pelorus.evaluation import judge, path_m
+from pelorus.explain import Explanation, explain
+from pelorus.explain.incident import Cause, Incident
+from pelorus.fleet.row import finite
+from pelorus.frames import Config, Header, Kind, Landmark, Message, Pose, Report, Role, Truth
+from pelorus.se3 import Poses
+from pelorus.trajectory import Trajectory, estimate_in, truth_in
+
+POSES_MOST = 40_000  # of a long log: with more, every second one is left out, and again
+EVALUATED = (
+    *("truth_frames", "err0_m", "ate_m", "rot_deg", "nees_per_dof"),
+    *("map_landmarks", "map_rms_m", "map_nees_per_dof"),
+)
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is kept of a piece: no message."""
+
+    verdict: Verdict
+    faults: list[str]
+    grave: list[str]  # those of the faults that spoil the result
+    found: Explanation
+    frames: int
+    good: int
+    sums: dict[str, float]
+
+    @classmethod
+    def of(cls, messages: Sequence[Message]) -> Part:
+        found = explain(messages)
+        run, known, verdict = judged_log(messages)
+        names = ("gated", "matched", "innovation_d2", "innovation_rows")
+        sums = {name: float(run.frames[name].sum()) for name in names}
+        faults, grave = _names(known)
+        good = round(run.good_share * run.health.frames)
+        return cls(verdict, faults, grave, _light(found), run.health.frames, good, sums)
+
+
+def _light(found: Explanation) -> Explanation:
+    """Returns the explanation without the messages that it came from."""
+    return Explanation(
+        found.origin_ns, found.end_ns, found.episodes, found.setup, found.health, found.remarks,
+        found.unexplained,
+    )  # fmt: skip
+
+
+def _names(known: Known) -> tuple[list[str], list[str]]:
+    return [f.name for f in known.faults], [f.name for f in known.faults if f.grave]
+
+
+@dataclass
+class Course:
+    """The path of a long log beside the truth, thinned out so that it stays small."""
+
+    ahead: list[Message] = field(default_factory=list)
+    poses: list[Message] = field(default_factory=list)
+    made: list[Message] = field(default_factory=list)  # landmarks whose place is known
+    truths: list[Trajectory] = field(default_factory=list)
+    path_m: float = 0.0
+    _known: set[int] = field(default_factory=set)
+    _stride: int = 1
+    _seen: int = 0
+    _last: Poses | None = None
+
+    def add(self, messages: Sequence[Message]) -> None:
+        """Adds a piece."""
+        if not self.ahead:
+            self.ahead = [m for m in messages if isinstance(m, Header | Config) or _is_known(m)]
+            self._known = {m.id for m in self.ahead if isinstance(m, Landmark)}
+        for m in messages:
+            if isinstance(m, Pose) and m.after_stereo:
+                if self._seen % self._stride == 0:
+                    self.poses.append(m)
+                self._seen += 1
+            elif isinstance(m, Landmark) and not _is_known(m) and m.id in self._known:
+                self.made.append(m)
+        while len(self.poses) > POSES_MOST:
+            self.poses, self._stride = self.poses[::2], 2 * self._stride
+        # Of all times: that of a piece's first frame stands before it, in the piece before.
+        if (truth := truth_in([m for m in messages if isinstance(m, Truth)])) is not None:
+            self.truths.append(truth)
+        if (estimate := estimate_in(messages)) is not None:
+            poses = estimate[0].poses
+            self.path_m += path_m(poses)
+            if self._last is not None:
+                self.path_m += float(np.linalg.norm(poses.p[0] - self._last.p))
+            self._last = poses.at(-1)
+
+    def figures(self) -> Figures:
+        """Returns the figures of the whole path."""
+        return judge([*self.ahead, *self.poses, *self.made], self._truth())
+
+    def _truth(self) -> Trajectory | None:
+        if not self.truths:
+            return None
+        t_ns, first = np.unique(np.concatenate([x.t_ns for x in self.truths]), return_index=True)
+        R = np.concatenate([x.poses.R for x in self.truths])[first]
+        p = np.concatenate([x.poses.p for x in self.truths])[first]
+        return Trajectory(t_ns, Poses(R, p))
+
+
+def _is_known(message: Message) -> bool:
+    return isinstance(message, Landmark) and message.role == Role.KNOWN
+
+
+def is_answered(messages: Sequence[Message]) -> bool:
+    """Returns whether a filter reported on a frame of this piece."""
+    return any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages)
+
+
+def columns_of(parts: Sequence[Part]) -> dict[str, Any]:
+    """Returns the columns of `explain`; the verdict on a long log is that on its worst piece."""
+    worst = max(parts, key=lambda part: part.verdict.grade)  # the first of equal ones
+    origin_ns, end_ns = parts[0].found.origin_ns, parts[-1].found.end_ns
+    total = {name: sum(part.sums[name] for part in parts) for name in parts[0].sums}
+    frames = sum(part.frames for part in parts)
+    first = next((p.found.episodes[0].first for p in parts if p.found.episodes), None)
+    return {
+        "grade": worst.verdict.mark,
+        "verdict": worst.verdict.words,
+        "cause": _cause(parts, worst, first),
+        "why": worst.verdict.doubts,
+        "what_to_set": [f"{name} = {value}" for name, value in worst.verdict.settings.items()],
+        "faults": _once(part.faults for part in parts),
+        "setup": _once(part.found.setup for part in parts),
+        "remarks": _once(part.found.remarks for part in parts),
+        "events": sum(len(part.found.episodes) for part in parts),
+        "diverged": sum(part.found.diverged for part in parts),
+        "first_cause": None if first is None else str(first.cause),
+        "first_s": None if first is None else (first.from_ns - origin_ns) * 1e-9,
+        "first_words": None if first is None else first.words,
+        "what_to_do": _remedy(parts, worst, first),
+        "duration_s": (end_ns - origin_ns) * 1e-9,
+        "frames": frames,
+        "good_share": sum(part.good for part in parts) / max(frames, 1),
+        "nis": _ratio(total["innovation_d2"], total["innovation_rows"]),
+        "gated_share": _ratio(total["gated"], total["matched"]),
+        "pieces": len(parts),
+    }
+
+
+def _cause(parts: Sequence[Part], worst: Part, first: Incident | None) -> str | None:
+    """Returns the fault that spoils the result, else the first event, else what lasts."""
+    grave = _once(part.grave for part in parts)
+    if grave:
+        return grave[0]
+    if first is not None:
+        return str(first.cause)
+    if any(part.found.setup for part in parts):
+        return str(Cause.SETTINGS)
+    if worst.faults:
+        return worst.faults[0]
+    return None if worst.verdict.grade is Grade.GOOD else "doubtful"
+
+
+def _remedy(parts: Sequence[Part], worst: Part, first: Incident | None) -> str | None:
+    if first is not None and not any(part.grave for part in parts):
+        return first.remedy
+    return "; ".join(worst.verdict.to_set) or None
+
+
+def _once(lists: Any) -> list[str]:
+    """Returns what the lists hold, each once."""
+    return list(dict.fromkeys(one for found in lists for one in found))
+
+
+def _ratio(part: float, whole: float) -> float | None:
+    return finite(part / whole) if whole else None
