@@ -36,8 +36,7 @@ static void learn_scatter(plr_source *source, const plr_real reading[PLR_POSE_DI
         s->change[i] = change;
     }
     for (unsigned i = 0; i < 2 && is_usual; i++)
-        s->scatter2[i] =
-            plr_leaky_mean(s->scatter2[i], CHANGE_SHARE, off2[i] / PLR_R(18));
+        s->scatter2[i] = plr_leaky_mean(s->scatter2[i], CHANGE_SHARE, off2[i] / PLR_R(18));
 }
 
 void plr_statistics_learn(const plr_belief *belief, plr_source *source, plr_time_ns t_ns,

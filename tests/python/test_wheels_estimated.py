@@ -27,6 +27,8 @@ DARK_FROM_S, DARK_S = 10.0, 60.0
 WHEEL = Sensing(rate_hz=50.0, axes="x", sigma=(0.03,))
 SLIPS = replace(WHEEL, slip_percent=50.0, slip_from_s=30.0, slip_for_s=5.0)
 SLIDE: tuple[Any, ...] = ("--wheel-slide-sigma", 0.05)
+SEEDS = draws([2, 1, *range(3, 17)])
+ONE_IN_A_THOUSAND = 22.46 / 6  # of chi-square of 6, a degree of freedom
 
 
 def driven(seed: int, wheel: Sensing, lap_s: float = 40.0, duration_s: float = 70.0) -> Recording:
@@ -60,20 +62,20 @@ def end_of(drive: Recording, log: Path) -> tuple[float, float]:
     return float(np.linalg.norm(off)), float(error @ np.linalg.solve(P, error)) / 6
 
 
-@pytest.mark.parametrize("seed", draws([2, 3]))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_minute_in_the_dark_costs_a_percent_of_the_way(seed: int, tmp_path: Path) -> None:
     drive = darkened(driven(seed, WHEEL))
     off_m, _ = end_of(drive, replayed(drive, tmp_path, *SLIDE))
     assert off_m <= 0.01 * DARK_S
 
 
-@pytest.mark.parametrize("seed", draws([2, 3]))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_slip_in_the_dark_is_told_and_costs_nothing(seed: int, tmp_path: Path) -> None:
     drive = darkened(driven(seed, SLIPS))
     log = replayed(drive, tmp_path, *SLIDE)
     off_m, nees = end_of(drive, log)
     assert off_m <= 0.02 * DARK_S
-    assert nees <= 2
+    assert nees <= ONE_IN_A_THOUSAND
     t_s = {
         round((m.t_ns - drive.frame_t_ns[0]) * 1e-9)
         for m in messages_of(log, Report)
@@ -82,7 +84,7 @@ def test_a_slip_in_the_dark_is_told_and_costs_nothing(seed: int, tmp_path: Path)
     assert {31, 32, 33, 34} <= t_s
 
 
-@pytest.mark.parametrize("seed", draws([1, 3]))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_scale_and_distance_of_wheels_are_found_in_a_minute(seed: int, tmp_path: Path) -> None:
     two = Sensing(50.0, (0.01,), "x", track_m=0.5, scale_percent=3.0, track_percent=5.0)
     drive = driven(seed, two, lap_s=12.0, duration_s=62.0)

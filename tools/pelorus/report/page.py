@@ -24,6 +24,7 @@ from pelorus.errors import write_text
 from pelorus.report.curves import Curves
 
 COLUMNS_MOST = 5
+FIGURE_MOST = 24  # letters of a cell; a column with a longer one holds words, which wrap
 GRADES = ("good", "care", "bad")
 
 
@@ -136,9 +137,14 @@ def _event(event: Event) -> str:
 
 def _table(table: PageTable) -> str:
     head, *rows = table.rows
-    cells = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    worded = [any(len(x) > FIGURE_MOST for x in column) for column in zip(*rows, strict=True)]
+    kinds = [' class="words"' if words else "" for words in worded or [False] * len(head)]
+    cells = "".join(f"<th{kind}>{escape(x)}</th>" for kind, x in zip(kinds, head, strict=True))
     many = len(head) > COLUMNS_MOST  # then a phone shows a row as a list, with the names
-    names = [f' data-head="{escape(name)}"' if many else "" for name in head]
+    names = [
+        kind + (f' data-head="{escape(name)}"' if many else "")
+        for kind, name in zip(kinds, head, strict=True)
+    ]
     body = "\n".join(
         "<tr>"
         + "".join(f"<td{name}>{escape(x)}</td>" for name, x in zip(names, row, strict=True))
