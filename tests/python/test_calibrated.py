@@ -137,4 +137,4 @@ def test_what_cannot_be_estimated_is_refused(
 
 
 def test_every_number_has_a_name() -> None:
-    assert len(PARTS) == len({part.key for part in PARTS}) == 11
+    assert len(PARTS) == len({part.key for part in PARTS}) == 13
