@@ -58,7 +58,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (SESSION, (*PORT, TELEMETRY)),
     (r"plr_start_\w+|plr_send_\w+|echo", ()),
     (r"plr_correct|plr_correct_towards|move_estimate", (r"(body|world)_retract",)),
-    (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
+    (r"hold|apply|apply_to_velocity|plr_measure_twist", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
     (
         r"plr_bias_prior_variance|plr_evidence_complete|add_biases|prior_of_drivers"
