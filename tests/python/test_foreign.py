@@ -299,7 +299,6 @@ OWN = (
 
 # Bags have a reader of their own, which few commands need; it fails in the same way.
 BAGS = "converters/bag.py"
-SPEEDS = "live/wheels.py"  # a stream of lines, which may go on for ever
 TRY = "commands/first_try.py"  # asks a .npz for its names, to choose the converter
 
 
@@ -310,4 +309,4 @@ def test_foreign_files_are_opened_in_one_place() -> None:
         for path in package.rglob("*.py")
         if OPENS.search(path.read_text(encoding="utf-8"))
     }
-    assert opening == {"foreign.py", BAGS, SPEEDS, TRY, *OWN}
+    assert opening == {"foreign.py", BAGS, TRY, *OWN}

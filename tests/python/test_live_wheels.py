@@ -97,7 +97,7 @@ def test_wheels_need_a_port_and_a_sigma(recording: Recording) -> None:
     for asked, said in (
         (WheelsAsked("udp:many"), "a free port"),
         (WheelsAsked("udp:0", sigma_mps=0), "--wheel-sigma is 0"),
-        (WheelsAsked("nowhere.csv"), "nowhere.csv: No such file"),
+        (WheelsAsked("nowhere.csv"), "nowhere.csv: cannot be read: No such file"),
     ):
         with pytest.raises(PelorusError, match=said):
             Beside(camera(recording), asked, HERE)

@@ -6,10 +6,9 @@ They sit on the robot: axes forward, left, up, as --mount has them.
 
 from __future__ import annotations
 
-import csv
 import heapq
-import json
 import socket
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from pelorus import foreign
 from pelorus.converters import wheels
 from pelorus.errors import PelorusError
 from pelorus.frames import Reading
@@ -74,21 +74,19 @@ class Table:
     """A CSV file in the order of its times."""
 
     def __init__(self, path: Path) -> None:
+        table = foreign.csv_rows(path)
         try:
-            with path.open(newline="", encoding="utf-8") as stream:
-                rows = [speeds_of(row) for row in csv.DictReader(stream)]
-        except OSError as error:
-            raise PelorusError(f"--wheels {path}: {error.strerror}") from None
+            rows = [speeds_of(dict(zip(table.names, row, strict=True))) for row in table.rows]
         except ValueError as error:
             raise PelorusError(f"--wheels {path}: {error}") from None
         stamps = [row.t_ns for row in rows if row.t_ns is not None]
         if not rows or len(stamps) < len(rows):
             raise PelorusError(f"--wheels {path}: columns t_ns or t_s, and {EXPECTED} are expected")
-        self._rows = sorted(rows, key=lambda row: row.t_ns or 0)
+        self._rows = deque(sorted(rows, key=lambda row: row.t_ns or 0))
 
     def until(self, t_ns: int) -> Iterator[Speeds]:
         while self._rows and (self._rows[0].t_ns or 0) <= t_ns:
-            yield self._rows.pop(0)
+            yield self._rows.popleft()
 
     def close(self) -> None:
         pass
@@ -116,11 +114,11 @@ class Datagrams:
         del t_ns
         while True:
             try:
-                told = json.loads(self._socket.recv(BYTES_MAX))
-                yield speeds_of(told if isinstance(told, dict) else {})
+                words = self._socket.recv(BYTES_MAX).decode()
+                yield speeds_of(foreign.json_words(Path("datagram"), words))
             except BlockingIOError:
                 return
-            except ValueError:
+            except (ValueError, PelorusError):
                 self.bad += 1
 
     def close(self) -> None:
