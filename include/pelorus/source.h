@@ -95,10 +95,9 @@ enum { PLR_WHEELS = 4 };
 
 /* Wheels, each known by its place: src/process/wheels.h. */
 typedef struct plr_wheels {
-    plr_time_ns t_ns[PLR_WHEELS]; /* of the last reading of each */
-    plr_time_ns
-        moved_ns[PLR_WHEELS]; /* of the last one that was not zero, or began a row of readings */
-    plr_time_ns slip_ns[PLR_WHEELS];     /* since when it slips; 0: it does not */
+    plr_time_ns t_ns[PLR_WHEELS];     /* of the last reading of each */
+    plr_time_ns moved_ns[PLR_WHEELS]; /* of the last one that moved, or that followed a silence */
+    plr_time_ns slip_ns[PLR_WHEELS];  /* since when it slips; 0: it does not */
     plr_time_ns interval_ns[PLR_WHEELS]; /* between its last two readings */
     plr_time_ns rest_ns;                 /* when a standstill was last told by them */
     plr_real at_B[3 * PLR_WHEELS];       /* m; with an IMU seen from it */

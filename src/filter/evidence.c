@@ -87,14 +87,6 @@ void plr_evidence_after_map(plr_filter *f, const plr_evidence_pose *before) {
     plr_sensitivity_add_to_pose(&f->belief, &f->camera, &f->motion, e->calibration);
 }
 
-/* What the settings allow a bias to be, as a variance. */
-static plr_real allowed_variance(const plr_config *c, unsigned k) {
-    const double linear =
-        c->process == PLR_PROCESS_IMU ? c->bias_accel_sigma_mps2 : c->bias_velocity_sigma_mps;
-    const double sigma = k < 3 ? linear : c->bias_gyro_sigma_radps;
-    return (plr_real)(sigma * sigma);
-}
-
 /* A bias that is well known, from a rest or from the caller, and moves, as where a gyro warms up, is no fault as
  * long as the settings allow a bias to be so large. */
 static void add_biases(plr_filter *f, plr_bias_evidence *e) {
@@ -106,7 +98,7 @@ static void add_biases(plr_filter *f, plr_bias_evidence *e) {
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
         e->off[k] = f->belief.bias[k] - f->source.bias_prior[k];
         const plr_real known = plr_bias_prior_variance(&f->source, k);
-        const plr_real allowed = allowed_variance(&f->config, k);
+        const plr_real allowed = (plr_real)plr_filter_bias_variance(&f->config, k);
         e->prior[k] = known > allowed ? known : allowed;
         e->variance[k] = P[(PLR_BIAS_DIM + 1) * k];
     }

@@ -160,13 +160,8 @@ static void start_bias(plr_filter *f) {
     static const double zero[PLR_POSE_DIM] = {0};
     double variance[PLR_POSE_DIM] = {0};
     if (f->config.mode != PLR_MODE_MAPPING)
-        for (int i = 0; i < PLR_POSE_DIM; i++) {
-            const double linear = f->config.process == PLR_PROCESS_IMU
-                                      ? f->config.bias_accel_sigma_mps2
-                                      : f->config.bias_velocity_sigma_mps;
-            const double sigma = i < 3 ? linear : f->config.bias_gyro_sigma_radps;
-            variance[i] = sigma * sigma;
-        }
+        for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+            variance[i] = plr_filter_bias_variance(&f->config, i);
     set_bias_prior(f, zero, variance);
 }
 

@@ -14,6 +14,14 @@
 /* Forgets the last twist reading: the body is assumed to stand still, reading - bias = 0. */
 void plr_filter_forget_reading(plr_filter *f);
 
+/* The prior's variance of bias k of 0 to 5, as the settings say. */
+static inline double plr_filter_bias_variance(const plr_config *config, unsigned k) {
+    const double linear = config->process == PLR_PROCESS_IMU ? config->bias_accel_sigma_mps2
+                                                             : config->bias_velocity_sigma_mps;
+    const double sigma = k < 3 ? linear : config->bias_gyro_sigma_radps;
+    return sigma * sigma;
+}
+
 /* The biases' covariance becomes a diagonal, uncorrelated with the rest. Only without landmarks. */
 void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]);
 

@@ -141,9 +141,9 @@ void plr_wheels_correct(const plr_source *source, const plr_camera_model *camera
     }
 }
 
-/* The true velocity is (1 + s) z, and z itself noisy: in its place stands what is predicted, M u = z - r. A place that is
- * farther by the share s from the middle adds s w x arm. By the rate of one reading, whose noise is in r, both
- * would seem to depend on each other: it is the smoothed one. */
+/* The true velocity is (1 + s) z. As z is noisy, the predicted M u = z - r stands in its place. A wheel that
+ * sits farther from the middle by the share s adds s w x arm. Its w is the smoothed rate: the noise of a single
+ * reading's is in r, too, and would correlate the two. */
 void plr_wheels_differentiate(const plr_belief *belief, const plr_source *source,
                               const plr_camera_model *camera, const plr_reading *reading,
                               uint8_t measured, const plr_real z[PLR_ROWS],

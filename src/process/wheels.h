@@ -17,9 +17,10 @@
 /* Notes where a reading's wheel sits, and whether it stands. */
 void plr_wheels_note(plr_source *source, const plr_reading *reading);
 
-/* True if the wheel of the last reading noted may be used: `passed` says that the gate accepted its residual r, m/s.
- * A wheel of which the gate has rejected six in succession slips. An IMU alone grows uncertain, and the gate wide: what then passes it is
- * used only if it is nearer to the estimate than to the slip as it has gone on, or after ten seconds. */
+/* True if the last reading noted may be used; `passed` says that the gate accepted its residual r, m/s. A
+ * wheel slips once the gate has rejected six of its readings in succession. Without pictures the pose then
+ * grows uncertain, and the gate wide: a reading that passes is used only if it is nearer to the estimate than
+ * to the slip as it was followed, or ten seconds after the slip began. */
 bool plr_wheels_hold(plr_source *source, const plr_real r[PLR_ROWS], bool passed);
 
 /* True, and noted, if all wheels have read exactly zero for half a second, once each tenth of a second. */
