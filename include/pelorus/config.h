@@ -30,8 +30,8 @@ extern "C" {
 #define PLR_REAL 32
 #endif
 
-/* Most landmarks that a filter can hold: 1 to 1024, default 32. RAM grows with the square: 26 KB
- * for 16 landmarks, 52 KB for 32 (docs/SIZES.md has more). The setting `slots` can use fewer. */
+/* Most landmarks that a filter can hold: 1 to 1024, default 32. RAM grows with the square: 27 KB
+ * for 16 landmarks, 53 KB for 32 (docs/SIZES.md has more). The setting `slots` can use fewer. */
 #ifndef PLR_MAX_LANDMARKS
 #define PLR_MAX_LANDMARKS 32
 #endif
