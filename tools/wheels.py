@@ -36,7 +36,7 @@ WHEELS = {
 
 
 def suffix(target: Target) -> str:
-    """Returns the suffix of a library, as tools/pelorus/native.py looks for it."""
+    """Returns the suffix of a library, as tools/pelorus/native/binding.py looks for it."""
     if target.windows:
         return ".dll"
     return ".dylib" if "macos" in target.triple else ".so"

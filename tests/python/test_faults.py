@@ -17,9 +17,9 @@ from drives import (
 )
 from pelorus.faults import axes, lever, stale, timing
 from pelorus.faults.mend import held_to_fit, mend
-from pelorus.frames import BodyAxes, TwistTiming
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire.frames import BodyAxes, TwistTiming
+from pelorus.wire.layout import Floats
 
 SEEDS = [1, 2]
 STALE = range(7, 590, 9)

@@ -16,9 +16,8 @@ from pathlib import Path
 import pytest
 from converted import Run
 from draws import LONG
-from pelorus import evaluation
-from pelorus.console import spoken_time
 from pelorus.errors import PelorusError
+from pelorus.evaluate import evaluation
 from pelorus.fleet import cluster, table
 from pelorus.fleet.examine import Work, digest_of_tools, examine
 from pelorus.fleet.journal import Journal
@@ -26,9 +25,10 @@ from pelorus.fleet.page import write_page
 from pelorus.fleet.pieces import in_pieces
 from pelorus.fleet.ranking import rank
 from pelorus.fleet.row import BROKEN, Found, Row
-from pelorus.frames import Stereo
-from pelorus.replay import result_of
-from pelorus.wire import Counts
+from pelorus.native.replay import result_of
+from pelorus.program.console import spoken_time
+from pelorus.wire.frames import Stereo
+from pelorus.wire.framing import Counts
 from replay_drive import BIN
 
 pytest.importorskip("distributed")

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus.cli import main
+from pelorus.commands.cli import main
 from pelorus.errors import PelorusError
-from pelorus.frames import Imu, Message, Stereo
 from pelorus.online.diagnosis import Level, of_health
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options as Drive
-from pelorus.simulation.simulate import simulate
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options as Drive
+from pelorus.simulate.simulate import simulate
+from pelorus.wire.frames import Imu, Message, Stereo
 from pelorus_ros import conventions
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options, misspelt, table

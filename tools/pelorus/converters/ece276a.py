@@ -14,17 +14,18 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import arrays, se3, trajectory
-from pelorus.arrays import Arrays
 from pelorus.converters import twist_noise
 from pelorus.faults import axes, stale, timing
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, TwistTiming, header_name
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.tracks import Tracks
+from pelorus.io import arrays, trajectory
+from pelorus.io.arrays import Arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Header, TwistTiming, header_name
 
 
 def convert(

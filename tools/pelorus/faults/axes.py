@@ -12,15 +12,15 @@ from itertools import permutations, product
 
 import numpy as np
 
-from pelorus import se3
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
 from pelorus.faults.likelihood import with_ratio
-from pelorus.frames import BodyAxes
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.visual_motion import SeenPairs, seen_pairs
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.tracking.visual_motion import SeenPairs, seen_pairs
+from pelorus.wire.frames import BodyAxes
+from pelorus.wire.layout import Floats
 
 SUBJECT = "body axes"
 LAG = 5

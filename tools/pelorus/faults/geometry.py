@@ -40,8 +40,8 @@ from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews
 from pelorus.faults.world_axes import world_axes
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire.layout import Floats
 
 FIT_LEAST = 0.6  # share of the point pairs that one motion explains
 LEFT_MOST = 0.7  # share of a motion's size that the twists leave unexplained

@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pelorus import schema
 from pelorus.converters import ros_frames
 from pelorus.errors import PelorusError, write_text
-from pelorus.frames import Imu, Reading, Twist
-from pelorus.known_map import known_map
-from pelorus.layout import Floats
+from pelorus.io.known_map import known_map
 from pelorus.online import diagnosis
 from pelorus.online.diagnosis import Status
 from pelorus.online.drive import Setup
 from pelorus.online.eyes import Seen
 from pelorus.online.odometry import Given, Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline
+from pelorus.wire import schema
+from pelorus.wire.frames import Imu, Reading, Twist
+from pelorus.wire.layout import Floats
 
 from pelorus_ros import conventions, status
 from pelorus_ros.mounting import NoChain, bare

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
 
-from pelorus.configured import Configured
 from pelorus.errors import PelorusError
-from pelorus.native import Precision, library
+from pelorus.native.binding import Precision, library
+from pelorus.native.configured import Configured
 
 MOTIONS = ("imu", "gyro_accel", "wheels")
 TRANSPORTS = ("raw", "compressed")
