@@ -12,19 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.verdicts import tell_verdict
 from pelorus.errors import Existing, PelorusError, made, whole_folder
 from pelorus.io.trajectory import read_stamped
 from pelorus.native.replay import find_programs
-from pelorus.program.console import (
-    err,
-    out,
-    print_json,
-    progress,
-    step,
-    steps,
-    tell_verdict,
-    waiting,
-)
+from pelorus.program.console import err, out, print_json, progress, step, steps, waiting
 from pelorus.program.extras import figures_missing
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists

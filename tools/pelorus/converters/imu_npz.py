@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 
 from pelorus.converters import imu_noise, renewal
 from pelorus.errors import PelorusError
-from pelorus.faults.axes import body_axes
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit
 from pelorus.io import arrays, foreign
@@ -31,6 +30,7 @@ from pelorus.io.named import Named
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
 from pelorus.math import se3
+from pelorus.math.axes import body_axes
 from pelorus.math.inertial import Inertial
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses

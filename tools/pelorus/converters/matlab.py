@@ -17,12 +17,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus.errors import PelorusError
-from pelorus.faults.axes import body_axes
 from pelorus.io import arrays
 from pelorus.io.arrays import Arrays
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
+from pelorus.math.axes import body_axes
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
 from pelorus.wire.layout import Floats

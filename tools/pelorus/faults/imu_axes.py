@@ -19,7 +19,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.faults.axes import ways
 from pelorus.faults.fit import WITHIN, Design, Fit
 from pelorus.faults.force import NO_BREAKS, by_images, force
 from pelorus.faults.imu_body import ImuBody
@@ -27,6 +26,7 @@ from pelorus.faults.seen import CameraMotion, Motions
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Indices
 from pelorus.math import se3
+from pelorus.math.axes import ways
 from pelorus.math.inertial import Inertial
 from pelorus.wire.layout import Floats
 

@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pelorus.faults.axes import ways
 from pelorus.faults.fit import TELLS_SIGMAS
 from pelorus.faults.likelihood import of_estimate
 from pelorus.math import se3
+from pelorus.math.axes import ways
 from pelorus.wire.layout import Floats
 
 BESIDE = (1, 2)

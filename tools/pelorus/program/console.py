@@ -14,15 +14,11 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import Progress, track
 from rich.text import Text
-
-if TYPE_CHECKING:
-    from pelorus.check.verdict import Verdict
 
 Item = TypeVar("Item")
 
@@ -168,17 +164,6 @@ def spoken_time(seconds: float) -> str:
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
-
-
-VERDICT_COLOURS = {"good": "green", "care": "yellow", "bad": "red"}
-
-
-def tell_verdict(verdict: Verdict) -> None:
-    """Prints a verdict in its colour, with reasons and settings, before a command's result."""
-    head, *why = verdict.lines()
-    out.print(f"[bold {VERDICT_COLOURS[verdict.mark]}]{escape(head)}[/]")
-    for words in why:
-        out.print(escape(words))
 
 
 @contextmanager

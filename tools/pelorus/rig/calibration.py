@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from pelorus.faults.axes import body_axes
 from pelorus.io import arrays, foreign
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
 from pelorus.math import se3
+from pelorus.math.axes import body_axes
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import BodyAxes, Header, Noise, TwistTiming, header_name
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.faults.axes import body_axes
 from pelorus.io import arrays
 from pelorus.io.foreign import ForeignFileError
 from pelorus.math import se3
+from pelorus.math.axes import body_axes
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
 from pelorus.rig.imu_model import ImuModel
