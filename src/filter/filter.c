@@ -273,9 +273,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     /* readings and frames of another clock are not used any more */
     if (f->source.reading_ns > t_ns || t_ns - f->source.reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
-    if (f->supervisor.last_frame_ns > t_ns ||
-        t_ns - f->supervisor.last_frame_ns > f->par.max_gap_ns)
-        plr_supervise_clock_set(&f->supervisor);
+    plr_supervise_clock_set_to(&f->supervisor, t_ns, f->par.max_gap_ns);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

@@ -14,7 +14,6 @@
 #include "state/blocks.h"
 #include "state/motion.h"
 #include "state/slots.h"
-#include "supervise/supervise.h"
 
 enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
@@ -186,7 +185,7 @@ static plr_gate_result judge(plr_search *s, unsigned i, bool found, const plr_re
         d2 = share >= LEAST_SHARE ? without_it : d2;
     }
     *judged_d2 = d2 += plr_stereo_row_gap_d2(&s->f->camera, plr_search_row(s, i)->seen);
-    const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i));
+    const bool accepted = plr_gate_accepts(s->f, s->opens_fixed_gate, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
         plr_track_add(slot, e);
@@ -356,7 +355,7 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
         changed = changed || (was_active && !(at->active > 0));
     }
     for (unsigned i = 0; active < MIN_POINTS && i < s->count; i++)
-        if (!plr_gate_accepts(s->f, s->residuals[i].prior_d2, 0)) {
+        if (!plr_gate_accepts(s->f, s->opens_fixed_gate, s->residuals[i].prior_d2, 0)) {
             changed = changed || s->residuals[i].active > 0;
             s->residuals[i].active = 0;
         }
@@ -404,8 +403,10 @@ static bool fits_poorly(const plr_search *s) {
         if (!(at->active > 0))
             continue;
         active++;
-        const bool allowed = plr_gate_accepts(s->f, at->prior_d2 * ASTRAY_SHARE, 0);
-        poor += allowed && (at->behind || !plr_gate_accepts(s->f, plr_dot3(at->e, at->e), 0));
+        const bool allowed =
+            plr_gate_accepts(s->f, s->opens_fixed_gate, at->prior_d2 * ASTRAY_SHARE, 0);
+        poor += allowed && (at->behind || !plr_gate_accepts(s->f, s->opens_fixed_gate,
+                                                            plr_dot3(at->e, at->e), 0));
     }
     return active >= MIN_POOR && 4 * poor >= active;
 }
@@ -447,13 +448,15 @@ static void judge_all(plr_search *s, bool found, const plr_real *U, const plr_re
     }
 }
 
-void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *first) {
-    plr_search s = {
-        .f = f, .sightings = sightings, .residuals = (plr_residual *)(void *)f->work.Vt};
+void plr_motion_find(plr_filter *f, plr_sightings *sightings, const plr_picture_decision *decided,
+                     plr_motion_first *first) {
+    plr_search s = {.f = f,
+                    .sightings = sightings,
+                    .residuals = (plr_residual *)(void *)f->work.Vt,
+                    .opens_fixed_gate = decided->opens_fixed_gate};
     plr_search_point best;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
-    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, plr_supervise_weight(&f->supervisor),
-                     &s.prior);
+    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, decided->weight, &s.prior);
     const unsigned unknown = enter(&s);
     plr_search_from_zero(&s, &best);
     unsigned active = judge_all_by_prior(&s, &best);
@@ -464,9 +467,8 @@ void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *
         plr_search_descend(&s, &best);
     for (unsigned again = 0; again < MORE_SEARCHES && fits_poorly(&s); again++)
         plr_search_descend(&s, &best);
-    const plr_misfit misfit = found && plr_supervise_may_exclude_odometry(&f->supervisor)
-                                  ? find_misfit(&s, &best)
-                                  : PLR_MISFIT_NONE;
+    const plr_misfit misfit =
+        found && decided->may_exclude_odometry ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
     first->outright = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
     found = found && plr_search_factorise(&best, 0, U);
     if (found)

@@ -71,22 +71,24 @@ static void take_up(plr_filter *f, const plr_sightings *sightings, const plr_see
     }
 }
 
-static void begin_at(plr_filter *f, const plr_sightings *sightings, const plr_found_pose *found) {
+static plr_picture_decision begin_at(plr_filter *f, const plr_sightings *sightings,
+                                     const plr_found_pose *found) {
     const bool again = plr_supervise_was_relocated(&f->supervisor);
     plr_real P[PLR_POSE_SQUARE];
     memcpy(f->belief.R_WB, found->R_WB, sizeof f->belief.R_WB);
     memcpy(f->belief.p_WB, found->p_WB, sizeof f->belief.p_WB);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = WIDER * found->P_xi[i];
-    plr_filter_begin_anew(f, P, true);
+    const plr_picture_decision decided = plr_filter_begin_anew(f, P, true);
     if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
         plr_filter_begin_prior_bias(f, 4);
     plr_alignment_keep_world(&f->source);
     take_up(f, sightings, plr_seen_known_of(f->work.Vt), found->count);
+    return decided;
 }
 
-bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings,
-                            plr_frame_events *events) {
+bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings, plr_frame_events *events,
+                            plr_picture_decision *decided) {
     plr_found_pose found;
     if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(&f->config, &f->map))
         return false;
@@ -95,7 +97,7 @@ bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings,
         !plr_find_pose(&f->belief, &f->camera, &f->map, f->work.Vt, sightings, false, &found);
     if (events->lost_in_map)
         return false;
-    begin_at(f, sightings, &found);
+    *decided = begin_at(f, sightings, &found);
     return true;
 }
 

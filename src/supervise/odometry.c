@@ -99,14 +99,9 @@ static void learn_usual(plr_supervisor *s) {
     judge_usual(s);
 }
 
-/* An event needs a before: the odometry has agreed with the pictures on this drive. */
-static bool has_before(const plr_supervisor *s) {
+bool plr_odometry_has_before(const plr_supervisor *s) {
     const bool agreed = s->agreement >= plr_limit(s, PLR_LIMIT_BEFORE_SHARE);
     return (agreed && !s->misfits) || plr_doubt_contradicted(s);
-}
-
-bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
-    return has_before(s);
 }
 
 /* ---------------------------------------------------------------- the difference of two poses */
@@ -261,7 +256,7 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
     carry_difference(s, m);
     plr_sum_add(&s->sum, plr_limit(s, PLR_LIMIT_SUM_KEEPS), nu, V);
     s->statistic = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_UNOBSERVED));
-    const bool before = has_before(s);
+    const bool before = plr_odometry_has_before(s);
     if ((calm || !before) && tells)
         learn_usual(s);
     if (calm || !before)

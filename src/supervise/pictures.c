@@ -36,9 +36,7 @@ static bool has_moved(const plr_supervisor *s, const plr_picture_evidence *e) {
     return sum > above;
 }
 
-/* A frozen picture would hold a moving body: it repeats the last one, though the body has moved by more than
- * noise. */
-bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
+bool plr_pictures_show_present(plr_supervisor *s, const plr_picture_evidence *e) {
     const bool repeats =
         e->matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
         (plr_real)e->same >= plr_limit(s, PLR_LIMIT_FROZEN_SHARE) * (plr_real)e->matched;
@@ -76,9 +74,7 @@ bool plr_pictures_lock(plr_supervisor *s, unsigned matched, unsigned gated) {
     return s->frames_mostly_gated == frames;
 }
 
-/* After a lock, or after ten frames without a used observation, until one is used: a gate of fixed width would
- * reject everything for ever. */
-bool plr_supervise_opens_fixed_gate(const plr_supervisor *s) {
+bool plr_pictures_open_fixed_gate(const plr_supervisor *s) {
     return s->frames_mostly_gated >= plr_limit_count(s, PLR_LIMIT_LOCK_FRAMES) ||
            s->frames_without_use >= plr_limit_count(s, PLR_LIMIT_LOST_FRAMES);
 }

@@ -52,6 +52,17 @@ static void lose(plr_supervisor *s) {
 
 /* ---------------------------------------------------------------- the three points of a frame */
 
+static plr_picture_decision decide_on_picture(const plr_supervisor *s, bool use) {
+    return (plr_picture_decision){.use = use,
+                                  .weight = s->weight,
+                                  .may_exclude_odometry = plr_odometry_has_before(s),
+                                  .opens_fixed_gate = plr_pictures_open_fixed_gate(s)};
+}
+
+plr_picture_decision plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
+    return decide_on_picture(s, !e->may_repeat || plr_pictures_show_present(s, e));
+}
+
 /* True if points have excluded the odometry for long enough to be followed: twists for one frame; an IMU for as long
  * as it takes far points, which have no part in a motion near the camera, to tell it from that of the body. */
 static bool is_confirmed(const plr_supervisor *s, plr_time_ns now_ns) {
@@ -227,10 +238,11 @@ void plr_supervise_pose_set(plr_supervisor *s) {
     forget_frames(s);
 }
 
-void plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
+plr_picture_decision plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
     forget_frames(s);
     lose(s);
     s->relocated = relocated;
+    return decide_on_picture(s, true);
 }
 
 void plr_supervise_reading(plr_supervisor *s, const plr_reading *reading, unsigned numbers,

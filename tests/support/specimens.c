@@ -200,7 +200,7 @@ void specimen_put_rows(double *H, unsigned n, const plr_rows *rows) {
 plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
     plr_measurement m;
     plr_verdict none = {.accepted = false};
-    return plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m) ? plr_gate_judge(f, &m)
+    return plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m) ? plr_gate_judge(f, false, &m)
                                                                       : none;
 }
 
