@@ -126,6 +126,7 @@ typedef struct plr_source {
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
     double bias_walked_s; /* for how long the biases have walked since that was their prior */
     plr_inertial inertial;
+    uint64_t left_out; /* as plr_supervisor.left_out: rules that are left out, for measurements */
     uint8_t reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
     /* Side by side, though each is used for a time alone: the checksum has them only then. */

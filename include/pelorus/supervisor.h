@@ -207,21 +207,31 @@ typedef struct plr_supervisor {
 
 /* ---------------------------------------------------------------- its thresholds */
 
-/* Every threshold of the supervisor: limits.def has value, unit, reason, and the scenario
- * and recording that need it. */
+/* Every threshold of detection: limits.def has value, unit, reason, and what needs it. First the rules, which
+ * plr_filter_leave_out can leave out, then the numbers that belong to one of them. */
 typedef enum plr_limit_id {
 #define LIMIT(name, value, off, unit, about, scenario, recording) PLR_LIMIT_##name,
+#define PART(name, value, unit, about, rule)
 #include "pelorus/limits.def"
 #undef LIMIT
+#undef PART
+    PLR_RULES,
+    PLR_LAST_RULE = PLR_RULES - 1,
+#define LIMIT(name, value, off, unit, about, scenario, recording)
+#define PART(name, value, unit, about, rule) PLR_LIMIT_##name,
+#include "pelorus/limits.def"
+#undef LIMIT
+#undef PART
     PLR_LIMITS
 } plr_limit_id;
 
 typedef struct plr_limit_row {
     const char *name, *unit, *about, *scenario, *recording;
+    const char *rule;  /* to which it belongs; NULL: it is a rule itself */
     double value, off; /* as it is; as it is where the rule is left out */
 } plr_limit_row;
 
-/* Row 0 to PLR_LIMITS - 1; NULL beyond. */
+/* Row 0 to PLR_LIMITS - 1, by plr_limit_id; NULL beyond. */
 const plr_limit_row *plr_limit_at(unsigned row);
 
 #ifdef __cplusplus

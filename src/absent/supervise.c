@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "supervise/exclusion.h"
 #include "supervise/health.h"
 #include "supervise/readings.h"
 
@@ -107,9 +108,21 @@ void plr_supervise_dead_reckons(plr_supervisor *s, const plr_readings_evidence *
     (void)now;
 }
 
-const plr_limit_row *plr_limit_at(unsigned row) {
-    (void)row;
-    return NULL;
+plr_misfit plr_exclusion_misfit(uint64_t left_out, const plr_exclusion_evidence *all,
+                                plr_real nu2) {
+    (void)left_out, (void)all, (void)nu2;
+    return PLR_MISFIT_NONE;
+}
+
+bool plr_exclusion_has_support(uint64_t left_out, const plr_exclusion_evidence *all,
+                               plr_misfit misfit) {
+    (void)left_out, (void)all, (void)misfit;
+    return false;
+}
+
+bool plr_exclusion_is_well_spread(uint64_t left_out, plr_real unobserved) {
+    (void)left_out, (void)unobserved;
+    return false;
 }
 
 #endif

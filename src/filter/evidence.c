@@ -164,6 +164,7 @@ plr_status plr_filter_leave_out(plr_filter *f, uint64_t limits) {
     if (sound != PLR_OK)
         return sound;
     plr_supervise_leave_out(&f->supervisor, limits);
+    f->source.left_out = limits;
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

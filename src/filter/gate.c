@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "filter/gate.h"
 
+#include "limits/limits.h"
 #include "math/small.h"
 #include "state/covariance.h"
 #include "state/sensitivity.h"
 
-/* Ten sigmas. A point that begins to move is not off by so much from one frame to the next. */
-#define FAR_D2 PLR_R(100)
-
-plr_gate_result plr_gate_rejection(plr_real d2) {
-    return d2 > FAR_D2 ? PLR_GATE_FAR : PLR_GATE_REJECTED;
+plr_gate_result plr_gate_rejection(uint64_t left_out, plr_real d2) {
+    return d2 > plr_limit(left_out, PLR_LIMIT_FAR_D2) ? PLR_GATE_FAR : PLR_GATE_REJECTED;
 }
 
 bool plr_gate_accepts(const plr_filter *f, bool opens, plr_real d2, plr_real residual2) {

@@ -30,8 +30,8 @@ typedef enum plr_gate_result {
  * residuals with that, px^2, and d^2 only where the supervisor opens such a gate. */
 bool plr_gate_accepts(const plr_filter *f, bool opens, plr_real d2, plr_real residual2);
 
-/* PLR_GATE_REJECTED or PLR_GATE_FAR. */
-plr_gate_result plr_gate_rejection(plr_real d2);
+/* PLR_GATE_REJECTED or PLR_GATE_FAR. `left_out`: the supervisor's rules that are left out. */
+plr_gate_result plr_gate_rejection(uint64_t left_out, plr_real d2);
 
 static inline bool plr_gate_accepted(const plr_sighting *s) {
     PLR_ASSERT(plr_is_matched(s) && s->verdict != PLR_GATE_NOT_JUDGED);

@@ -41,6 +41,7 @@ typedef struct plr_search {
     plr_residual *residuals; /* in work.Vt, which is free until the motion is applied */
     unsigned count;
     bool opens_fixed_gate; /* plr_picture_decision */
+    uint64_t left_out;     /* rules of the supervisor */
     unsigned current;      /* which U belongs to the best point */
     plr_applied_motion prior;
 } plr_search;

@@ -89,6 +89,7 @@ static void choose(plr_filter *f, plr_sightings *frame, plr_report *report) {
 /* Gates each row by its own prediction, when the motion has been applied already, and keeps the
  * measurements. */
 static void gate_each(plr_filter *f, plr_sightings *frame, bool opens) {
+    const uint64_t left_out = plr_supervise_left_out(&f->supervisor);
     for (unsigned k = 0; k < frame->count; k++) {
         plr_sighting *row = &frame->at[k];
         if (!plr_is_matched(row))
@@ -99,8 +100,8 @@ static void gate_each(plr_filter *f, plr_sightings *frame, bool opens) {
             verdict = plr_gate_judge(f, opens, &m);
             plr_measurement_keep(&f->belief, &f->work, row->slot, &m);
         }
-        row->verdict =
-            (uint8_t)(verdict.accepted ? PLR_GATE_ACCEPTED : plr_gate_rejection(verdict.d2));
+        row->verdict = (uint8_t)(verdict.accepted ? PLR_GATE_ACCEPTED
+                                                  : plr_gate_rejection(left_out, verdict.d2));
         frame->of_slot[row->slot].d2 = verdict.d2;
         frame->of_slot[row->slot].det_S = verdict.det_S;
     }

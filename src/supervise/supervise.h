@@ -90,9 +90,13 @@ static inline bool plr_supervise_has_readings(const plr_supervisor *s) {
     return !(s->reasons & PLR_REASON_NO_TWISTS);
 }
 
-/* For measurements: the rules that are left out from now on, bits of plr_limit_id. */
+/* For measurements: the rules that are left out from now on, bits of plr_limit_id; and those that are. */
 static inline void plr_supervise_leave_out(plr_supervisor *s, uint64_t limits) {
     s->left_out = limits;
+}
+
+static inline uint64_t plr_supervise_left_out(const plr_supervisor *s) {
+    return s->left_out;
 }
 
 /* What was seen in the last frame, and decided; the rejected landmarks are not filled. */
