@@ -336,7 +336,7 @@ plr_readings_evidence plr_filter_readings_at(const plr_filter *f, plr_time_ns no
                                    .needed = f->config.mode != PLR_MODE_MAPPING,
                                    .looks = f->config.mode != PLR_MODE_DEAD_RECKONING,
                                    .imu = imu,
-                                   .started = !imu || f->source.inertial.started,
+                                   .started = !imu || f->source.inertial.phase >= PLR_IMU_UNSETTLED,
                                    .unsettled = imu && plr_alignment_is_unsettled(&f->source),
                                    .fault_of_start = fault > PLR_IMU_FAULT_MOVES &&
                                                      fault < PLR_IMU_FAULT_SATURATED,

@@ -97,10 +97,10 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
     plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
     plr_calibration_note_rate(&f->camera, &f->source, reading + 3);
-    if (f->source.inertial.started)
+    if (f->source.inertial.phase >= PLR_IMU_UNSETTLED)
         return plr_predict_accept(f, t_ns, reading, &planned);
     plr_alignment_add(&f->belief, &f->source, &f->config, t_ns, reading);
-    if (f->source.inertial.started)
+    if (f->source.inertial.phase >= PLR_IMU_UNSETTLED)
         plr_filter_store_for_recovery(f);
     const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
     plr_guard_seal_whole(f); /* the start sets P */

@@ -6,6 +6,7 @@
 #include "limits/limits.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "process/imu_phase.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 
@@ -207,9 +208,9 @@ static void set_unknown_velocity(plr_belief *belief, plr_real variance) {
     set_velocity(belief, none, same);
 }
 
-static void begin(plr_source *source, plr_time_ns t_ns, plr_real interval) {
+static void begin(plr_source *source, plr_imu_trigger how, plr_time_ns t_ns, plr_real interval) {
     plr_inertial *s = &source->inertial;
-    s->started = 1;
+    plr_imu_phase_change(s, how);
     s->started_ns = s->still_ns = t_ns;
     source->bias_walked_s = 0; /* the biases begin with their prior's variances */
     s->usual_s = interval;
@@ -293,8 +294,7 @@ static void start_at_rest(plr_belief *belief, plr_source *source, plr_time_ns t_
     set_unknown_velocity(belief, speed * speed);
     set_tilt_covariance(belief, u, theta);
     plr_covariance_set(belief, PLR_BLOCK_BIAS, PLR_BLOCK_POSE, cross);
-    begin(source, t_ns, interval);
-    source->inertial.anchored = PLR_ANCHORED;
+    begin(source, PLR_IMU_STARTS_AT_REST, t_ns, interval);
 }
 
 /* In motion: the tilt from a moment's mean, with a velocity that the first frames will find. */
@@ -305,14 +305,13 @@ static void start_in_motion(plr_belief *belief, plr_source *source, plr_time_ns 
     tilt(belief, u);
     set_unknown_velocity(belief, source->start_velocity_variance);
     set_tilt_covariance(belief, u, theta);
-    begin(source, t_ns, interval);
+    begin(source, PLR_IMU_STARTS_MOVING, t_ns, interval);
 }
 
 void plr_alignment_given(plr_belief *belief, plr_source *source, const plr_real v[PLR_VELOCITY_DIM],
                          const plr_real variance[PLR_VELOCITY_DIM]) {
     set_velocity(belief, v, variance);
-    begin(source, belief->t_ns, 0);
-    source->inertial.anchored = PLR_ANCHORED;
+    begin(source, PLR_IMU_STARTS_AS_TOLD, belief->t_ns, 0);
 }
 
 void plr_alignment_does_not_stand(plr_source *source, plr_imu_fault how) {
@@ -349,25 +348,37 @@ static bool try_to_start(plr_belief *belief, plr_source *source, plr_time_ns t_n
     return true;
 }
 
+/* What may start it, by the setting `imu-start`. Where both may, motion waits until a rest has not come. */
+typedef struct start_way {
+    bool at_rest, in_motion;
+    bool as_told; /* by the pose that was set, whatever the readings say */
+} start_way;
+
+static const start_way ways[] = {
+    [PLR_IMU_START_AUTO] = {.at_rest = true, .in_motion = true},
+    [PLR_IMU_START_REST] = {.at_rest = true},
+    [PLR_IMU_START_MOTION] = {.in_motion = true},
+    [PLR_IMU_START_GIVEN] = {.as_told = true},
+};
+
 void plr_alignment_add(plr_belief *belief, plr_source *source, const plr_config *config,
                        plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
-    const plr_imu_start kind = (plr_imu_start)config->imu_start;
+    const start_way *way = &ways[config->imu_start];
     plr_alignment *at = &source->alignment;
-    if (kind == PLR_IMU_START_GIVEN) {
-        if (!source->inertial.pose_given)
-            return;
-        set_unknown_velocity(belief, source->start_velocity_variance);
-        begin(source, t_ns, 0);
+    if (way->as_told) {
+        if (source->inertial.pose_given) {
+            set_unknown_velocity(belief, source->start_velocity_variance);
+            begin(source, PLR_IMU_STARTS_MOVING, t_ns, 0);
+        }
         return;
     }
     end_stretch(source, t_ns);
     average(at, t_ns, reading);
     const plr_time_ns stretch = t_ns - at->begin_ns;
     const plr_time_ns wait = at->seen_to_move ? STRETCH_NS : MOVING_NS;
-    const bool may_move =
-        kind == PLR_IMU_START_MOTION || (kind == PLR_IMU_START_AUTO && t_ns - at->first_ns >= wait);
+    const bool may_move = way->in_motion && (!way->at_rest || t_ns - at->first_ns >= wait);
     bool started = false;
-    if (stretch >= STRETCH_NS && kind != PLR_IMU_START_MOTION)
+    if (stretch >= STRETCH_NS && way->at_rest)
         started = try_to_start(belief, source, t_ns, true);
     const bool doubtful =
         source->inertial.fault == PLR_IMU_FAULT_TURNS; /* the gyro is wrong, or soon rests */
@@ -403,7 +414,7 @@ void plr_alignment_watch_gravity(const plr_belief *belief, plr_source *source) {
     const bool watches = s->fault == PLR_IMU_FAULT_NONE &&
                          belief->t_ns - s->started_ns <= plr_limit_ns(left_out, PLR_LIMIT_WATCH_MS);
     const bool doubts = s->fault > PLR_IMU_FAULT_NONE && s->fault < PLR_IMU_FAULT_TILT;
-    if (!s->started || !(watches || doubts))
+    if (s->phase < PLR_IMU_UNSETTLED || !(watches || doubts))
         return;
     const plr_imu_fault doubt = find_doubt(belief, source);
     if ((doubt != PLR_IMU_FAULT_NONE) == doubts)
@@ -422,11 +433,12 @@ void plr_alignment_watch_gravity(const plr_belief *belief, plr_source *source) {
 /* ---------------------------------------------------------------- the anchor */
 
 bool plr_alignment_is_unsettled(const plr_source *source) {
-    return source->inertial.started && source->inertial.anchored != PLR_ANCHORED;
+    return source->inertial.phase == PLR_IMU_UNSETTLED ||
+           source->inertial.phase == PLR_IMU_UNSETTLED_IN_WORLD;
 }
 
 void plr_alignment_follow_clock(const plr_belief *belief, plr_source *source, plr_time_ns t_ns) {
-    if (!source->inertial.started)
+    if (source->inertial.phase < PLR_IMU_UNSETTLED)
         return;
     source->inertial.started_ns +=
         t_ns - belief->t_ns; /* unsigned: a time before zero wraps, and back */
@@ -434,8 +446,8 @@ void plr_alignment_follow_clock(const plr_belief *belief, plr_source *source, pl
 }
 
 void plr_alignment_keep_world(plr_source *source) {
-    if (source->process == PLR_PROCESS_IMU && source->inertial.anchored == PLR_ANCHOR_DUE)
-        source->inertial.anchored = PLR_WORLD_IS_GIVEN;
+    if (source->process == PLR_PROCESS_IMU)
+        plr_imu_phase_change(&source->inertial, PLR_IMU_WORLD_GIVEN);
 }
 
 /* Adds variances of the position, in each direction, and of the yaw, about the vertical u. */
@@ -466,12 +478,12 @@ void plr_alignment_anchor(plr_belief *belief, const plr_motion *motion, plr_sour
     if (!plr_alignment_is_unsettled(source) || s->frames < ANCHOR_FRAMES ||
         belief->t_ns - s->started_ns < ANCHOR_NS || motion->pending)
         return;
-    if (s->anchored == PLR_WORLD_IS_GIVEN) {
+    if (s->phase == PLR_IMU_UNSETTLED_IN_WORLD) {
         const plr_real way2 = source->start_velocity_variance * (FOUND_S * FOUND_S);
         add_to_pose(belief, u, TILT * TILT * way2, TILT * TILT * (TILT * TILT));
     } else {
         forget_place(belief, u);
         add_to_pose(belief, u, variance, variance);
     }
-    source->inertial.anchored = PLR_ANCHORED;
+    plr_imu_phase_change(&source->inertial, PLR_IMU_ANCHORS);
 }
