@@ -11,7 +11,7 @@ import pytest
 from converted import COUNT, SHORT, Run, messages_of
 from drives import clean, mat_arrays
 from pelorus.converters import matlab
-from pelorus.frames import BodyAxes, Header, Landmark, Role, Stereo, Truth, Twist, TwistTiming
+from pelorus.wire.frames import BodyAxes, Header, Landmark, Role, Stereo, Truth, Twist, TwistTiming
 from scipy.io import savemat
 
 

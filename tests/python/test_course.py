@@ -12,12 +12,12 @@ import pytest
 from converted import Run as Command
 from draws import long_run
 from drives import clean, npz_arrays, with_stale_tracks
-from pelorus import road
 from pelorus.converters import ece276a
-from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo, Truth
+from pelorus.evaluate import road
 from pelorus.report.comparison import traces
-from pelorus.settings import IDS
-from pelorus.wire import messages_of
+from pelorus.wire.frames import Config, Kind, Landmark, Message, Report, Role, Stereo, Truth
+from pelorus.wire.framing import messages_of
+from pelorus.wire.settings import IDS
 from PIL import Image
 from replay_drive import BIN, ROOT, drive, encode, header
 from report_runs import built_programs

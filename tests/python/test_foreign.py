@@ -17,11 +17,11 @@ import pelorus
 import pytest
 from converted import SHORT, Run, messages_of
 from drives import clean, mat_arrays, npz_arrays
-from pelorus import foreign
-from pelorus.arrays import read_mat
 from pelorus.errors import write_text
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import NAME_BYTES_MAX, Header, header_name
+from pelorus.io import foreign
+from pelorus.io.arrays import read_mat
+from pelorus.io.foreign import ForeignFileError
+from pelorus.wire.frames import NAME_BYTES_MAX, Header, header_name
 from scipy.io import loadmat, savemat
 
 DAMAGES = 300
@@ -290,8 +290,8 @@ OPENS = re.compile(
 # What they open is the project's own: recordings, settings, results of its replay, its build, its
 # devices.
 OWN = (
-    *("check/contents.py", "errors.py", "wire.py"),
-    *("packed_file.py", "report/page.py", "replay.py", "schema.py"),
+    *("check/contents.py", "errors.py", "wire/framing.py"),
+    *("wire/packed_file.py", "report/page.py", "native/replay.py", "wire/schema.py"),
     *("robot/emulator.py", "robot/serial.py"),
     *("fleet/examine.py", "fleet/journal.py"),
 )
@@ -309,4 +309,4 @@ def test_foreign_files_are_opened_in_one_place() -> None:
         for path in package.rglob("*.py")
         if OPENS.search(path.read_text(encoding="utf-8"))
     }
-    assert opening == {"foreign.py", BAGS, TRY, *OWN}
+    assert opening == {"io/foreign.py", BAGS, TRY, *OWN}

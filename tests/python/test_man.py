@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 import typer
 from converted import Run
-from pelorus import man
-from pelorus.application import application
-from pelorus.cli import COMMANDS
+from pelorus.commands import man
+from pelorus.commands.application import application
+from pelorus.commands.cli import COMMANDS
 from replay_drive import BIN
 
 

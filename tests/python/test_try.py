@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus.cli import main
+from pelorus.commands.cli import main
 
 
 @pytest.fixture(scope="module")

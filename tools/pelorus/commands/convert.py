@@ -15,7 +15,6 @@ from pelorus.commands import importers, own
 from pelorus.commands.choices import Fix, Timing, TimingOrAuto
 from pelorus.commands.conversion import write
 from pelorus.commands.importers import OWN_DATA
-from pelorus.console import out
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import ece276a as ece276a_converter
 from pelorus.converters import imu_npz as imu_npz_converter
@@ -23,8 +22,9 @@ from pelorus.converters import landmark_map, late_turns, matlab, readings_csv
 from pelorus.converters.columns import Columns
 from pelorus.converters.streams import TwistIn
 from pelorus.faults.mend import held_to_fit
+from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.program.console import out
 from pelorus.rig.lens import LensModel
-from pelorus.small_sensors import SMALL_SENSORS
 
 SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
 DATA_SETS = "Files of known data sets"

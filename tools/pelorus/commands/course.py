@@ -11,15 +11,15 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus import road
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out
 from pelorus.errors import Existing, PelorusError, made, write_text
-from pelorus.extras import figures_missing
-from pelorus.packed_file import bare_name
-from pelorus.replay import find_programs
+from pelorus.evaluate import road
+from pelorus.io.trajectory import read_truth
+from pelorus.native.replay import find_programs
+from pelorus.program.console import err, out
+from pelorus.program.extras import figures_missing
 from pelorus.report.results import Subject, read_subject
-from pelorus.trajectory import read_truth
+from pelorus.wire.packed_file import bare_name
 
 if TYPE_CHECKING:
     from pelorus.course.trial import Reference, Trial
@@ -163,8 +163,8 @@ def _draw(trials: list[Trial], folder: Path) -> tuple[str, ...]:
     if missing := figures_missing():
         err.print(escape(f"the table comes without figures: {missing}"))
         return ()
-    from pelorus import style  # noqa: PLC0415 - an extra
     from pelorus.course import pictures  # noqa: PLC0415 - as above
+    from pelorus.program import style  # noqa: PLC0415 - an extra
 
     style.save(lambda: pictures.figure_1(trials), folder / FIGURE_1)
     style.save(lambda: pictures.figure_2(trials), folder / FIGURE_2)

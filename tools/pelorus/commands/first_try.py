@@ -10,8 +10,8 @@ from pathlib import Path
 import typer
 
 from pelorus.commands.another import run_command
-from pelorus.console import step, steps
 from pelorus.errors import Existing, PelorusError, made, resolved
+from pelorus.program.console import step, steps
 
 STEPS_OF_CHECK, STEPS_OF_REPORT = 5, 3  # theirs load slowly
 RECORDINGS = (".plr", ".plr.zst")

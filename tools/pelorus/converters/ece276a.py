@@ -14,17 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import arrays, se3, trajectory
-from pelorus.arrays import Arrays
 from pelorus.converters import twist_noise
-from pelorus.faults import axes, stale, timing
+from pelorus.faults import stale, timing
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, TwistTiming, header_name
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.tracks import Tracks
+from pelorus.io import arrays, trajectory
+from pelorus.io.arrays import Arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math import se3
+from pelorus.math.axes import body_axes
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Header, TwistTiming, header_name
 
 
 def convert(
@@ -54,7 +56,7 @@ def convert(
     if keep_ids:
         recording = replace(recording, tracks=tracks)
         findings = [_left_alone(finding) for finding in findings]
-    recording = recording.with_header(body_axes=axes.body_axes(recording.T_CB.R))
+    recording = recording.with_header(body_axes=body_axes(recording.T_CB.R))
     return (with_truth(recording, truth) if truth else recording), findings
 
 

@@ -16,16 +16,16 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import arrays
-from pelorus.arrays import Arrays
 from pelorus.errors import PelorusError
-from pelorus.faults.axes import body_axes
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.tracks import Tracks
+from pelorus.io import arrays
+from pelorus.io.arrays import Arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math.axes import body_axes
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
+from pelorus.wire.layout import Floats
 
 LANDMARK_SIGMA_M = 0.01  # Starry Night's map was surveyed by motion capture
 

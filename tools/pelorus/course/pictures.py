@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pelorus.course.trial import NAMES, Trial
-from pelorus.layout import Floats
+from pelorus.program.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
 from pelorus.report.results import OWN
 from pelorus.report.top_view import Box, around
-from pelorus.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
+from pelorus.wire.layout import Floats
 
 COLUMN_IN, HEIGHT_1_IN, HEIGHT_2_IN = 7.0, 6.4, 6.0
 MARGIN = 0.08  # of the larger side

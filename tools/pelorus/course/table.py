@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from pelorus.course.trial import NAMES, Trial
-from pelorus.evaluation import step_change
-from pelorus.layout import Floats
+from pelorus.evaluate.evaluation import step_change
 from pelorus.report.words import NONE, POSE_KEYS, number
+from pelorus.wire.layout import Floats
 
 TITLES = (
     "recording",

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import road
-from pelorus.console import progress
 from pelorus.errors import PelorusError
+from pelorus.evaluate import road
+from pelorus.evaluate.road import RoadFit
 from pelorus.grid import plane
 from pelorus.grid.sightings import sightings
-from pelorus.layout import Floats
-from pelorus.replay import Programs
+from pelorus.math.se3 import apply
+from pelorus.native.replay import Programs
+from pelorus.program.console import progress
 from pelorus.report.comparison import COURSE, Comparison, Traces
 from pelorus.report.results import OWN, Run, Subject, carry_out, plan_runs
-from pelorus.road import RoadFit
-from pelorus.se3 import apply
+from pelorus.wire.layout import Floats
 
 NAMES = {
     "dead-reckoning": "dead reckoning",

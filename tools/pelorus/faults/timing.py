@@ -10,9 +10,9 @@ from __future__ import annotations
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
 from pelorus.faults.likelihood import with_ratio
-from pelorus.frames import TwistTiming
-from pelorus.recording import Recording
-from pelorus.visual_motion import seen_pairs
+from pelorus.io.recording import Recording
+from pelorus.tracking.visual_motion import seen_pairs
+from pelorus.wire.frames import TwistTiming
 
 Z_MIN = 3.0
 
