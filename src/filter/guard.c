@@ -86,7 +86,7 @@ static uint64_t small_sum(const plr_filter *f) {
     ADD_BETWEEN(&sum, f, belief.count, belief.slots);
     add(&sum, plr_covariance_elements(&f->belief), (used < HEAD ? used : HEAD) * sizeof(plr_real));
     ADD_BETWEEN(&sum, f, clock_started, guard);
-    if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
+    if (f->config.process == PLR_PROCESS_IMU && f->source.inertial.phase < PLR_IMU_UNSETTLED)
         add(&sum, &f->source.alignment, sizeof f->source.alignment);
     if (f->source.velocities_known)
         add(&sum, &f->source.velocities, sizeof f->source.velocities);
