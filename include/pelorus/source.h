@@ -125,6 +125,7 @@ typedef struct plr_source {
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
     double bias_walked_s; /* for how long the biases have walked since that was their prior */
+    uint32_t unused;      /* readings refused since the filter's time last moved */
     plr_inertial inertial;
     uint8_t reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
