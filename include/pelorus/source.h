@@ -132,6 +132,7 @@ typedef struct plr_source {
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
     double bias_walked_s; /* for how long the biases have walked since that was their prior */
+    uint32_t unused;      /* readings refused since the filter's time last moved */
     plr_inertial inertial;
     uint64_t left_out; /* as plr_supervisor.left_out: rules that are left out, for measurements */
     uint8_t reading_valid;

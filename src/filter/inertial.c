@@ -24,8 +24,7 @@
 static plr_status refuse(plr_filter *f, plr_status status, plr_imu_fault fault) {
     if (fault != PLR_IMU_FAULT_NONE)
         f->source.inertial.fault = (uint8_t)fault;
-    f->totals.twists_refused++;
-    return plr_filter_refuse(f, status);
+    return plr_predict_refuse(f, status);
 }
 
 /* True if one of three numbers is at the end of the sensor's range; a range of 0 is not known. */
