@@ -214,7 +214,7 @@ ensure_python # there by now; if not, it says why and ends this
 # --- form, beside the first build -----------------------------------------------------------------
 
 beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tools/firmware tools/*.py port/ros2/pelorus_ros/pelorus_ros/[!n]*.py tests/python tests/layering tests/golden tests/fuzz tests/independent \
+    tools/pelorus tools/course/pelorus_course tools/firmware tools/*.py port/ros2/pelorus_ros/pelorus_ros/[!n]*.py tests/python tests/layering tests/golden tests/fuzz tests/independent \
     tests/recordings examples/*.py
 beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target

@@ -107,8 +107,8 @@ typedef struct plr_wheels {
     uint8_t count, latest; /* latest: the one that sent the last reading; count: none of them */
 } plr_wheels;
 
-/* The source of motion, twists or an IMU: what init was given, and from `reading_ns` on what its readings have
- * shown. Of sigmas the squares. */
+/* The source of motion, twists or an IMU: what init was given, up to `poses_are_given`; what is used for a time
+ * alone; and from `reading_ns` on what every reading changes. Of sigmas the squares. */
 typedef struct plr_source {
     plr_real velocity_variance[3], gyro_variance[3]; /* of twists, in the body's axes */
     plr_real bias_velocity_walk, bias_gyro_walk;     /* of twists: variance that a second adds */
@@ -122,19 +122,21 @@ typedef struct plr_source {
     uint8_t timing, noise;   /* plr_twist_timing; of twists plr_noise_kind */
     uint8_t poses_are_given; /* 1: in mapping, where no reading moves the pose */
 
+    /* The checksum has each of these only while it is used. */
+    plr_alignment alignment;   /* with an IMU, until it has started */
+    plr_velocities velocities; /* with twists, while any is known */
+    plr_wheels wheels;         /* once one has sent a reading */
+
     plr_time_ns reading_ns;         /* of the last twist or IMU reading */
     plr_real interval_s;            /* between the last two of them */
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
     double bias_walked_s; /* for how long the biases have walked since that was their prior */
+    uint32_t unused;      /* readings refused since the filter's time last moved */
     plr_inertial inertial;
     uint64_t left_out; /* as plr_supervisor.left_out: rules that are left out, for measurements */
     uint8_t reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
-    /* Each is used for a part of the time, and only then part of the checksum. */
-    plr_alignment alignment;   /* with an IMU, until it has started */
-    plr_velocities velocities; /* with twists, while any is known */
-    plr_wheels wheels;         /* once one has sent a reading */
 } plr_source;
 
 #endif

@@ -206,6 +206,7 @@ plr_status plr_filter_reset(plr_filter *f) {
 void plr_filter_forget_reading(plr_filter *f) {
     plr_velocity_forget(&f->source);
     f->source.reading_valid = 0;
+    f->source.unused = 0;
     f->source.interval_s = 0;
     plr_process_of(&f->source)->rest(&f->belief, &f->source, f->source.reading);
 }
@@ -229,6 +230,7 @@ static void store_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
     memcpy(f->belief.p_WB, T_WB->p, sizeof f->belief.p_WB);
     f->belief.t_ns = t_ns;
     f->clock_started = 1;
+    f->source.unused = 0;
 }
 
 plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB,

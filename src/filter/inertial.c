@@ -24,12 +24,17 @@
 static plr_status refuse(plr_filter *f, plr_status status, plr_imu_fault fault) {
     if (fault != PLR_IMU_FAULT_NONE)
         f->source.inertial.fault = (uint8_t)fault;
-    f->totals.twists_refused++;
-    return plr_filter_refuse(f, status);
+    return plr_predict_refuse(f, status);
 }
 
-static bool is_at(double value, double range) {
-    return range > 0 && (value >= range || value <= -range);
+/* True if one of three numbers is at the end of the sensor's range; a range of 0 is not known. */
+static bool is_at_end(const double x[3], double range) {
+    if (!(range > 0))
+        return false;
+    for (unsigned i = 0; i < 3; i++)
+        if (x[i] >= range || x[i] <= -range)
+            return true;
+    return false;
 }
 
 /* True if a reading differs from the one before by more than readings usually do, and than is possible. */
@@ -52,10 +57,9 @@ static bool is_spike(const plr_source *source, const plr_real change2[2]) {
 static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
                                 const plr_real reading[PLR_POSE_DIM], const plr_real change2[2]) {
     plr_inertial *s = &f->source.inertial;
-    for (unsigned i = 0; i < 3; i++)
-        if (is_at(imu->a_B_mps2[i], f->config.accel_range_mps2) ||
-            is_at(imu->w_B_radps[i], f->config.gyro_range_radps))
-            return PLR_IMU_FAULT_SATURATED;
+    if (is_at_end(imu->a_B_mps2, f->config.accel_range_mps2) ||
+        is_at_end(imu->w_B_radps, f->config.gyro_range_radps))
+        return PLR_IMU_FAULT_SATURATED;
     const bool same = f->source.reading_valid &&
                       memcmp(reading, f->source.reading, sizeof f->source.reading) == 0;
     s->repeated = same ? (uint16_t)(s->repeated + (s->repeated < UINT16_MAX)) : 0;
@@ -71,7 +75,7 @@ static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
 
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *imu) {
     plr_real reading[PLR_POSE_DIM];
-    const plr_status sound = imu ? plr_guard_check(f) : PLR_E_ARGUMENT;
+    const plr_status sound = imu ? plr_guard_check_reading(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.process != PLR_PROCESS_IMU)
@@ -87,22 +91,23 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
         if (!plr_is_finite(reading[i]))
             return refuse(f, PLR_E_RANGE, PLR_IMU_FAULT_NONE);
 
-    const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
-    if (planned.status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
-        return plr_predict_accept(f, t_ns, reading, &planned);
+    plr_process_step step;
+    const plr_status planned = plr_predict_plan(f, t_ns, reading, &step);
+    if (planned != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
+        return plr_predict_accept(f, t_ns, reading, planned, &step);
     plr_real change2[2];
     plr_statistics_change(&f->source, reading, change2);
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
+    plr_statistics_learn(&f->belief, &f->source, t_ns, reading, step.interval, change2);
     plr_calibration_note_rate(&f->camera, &f->source, reading + 3);
     if (f->source.inertial.phase >= PLR_IMU_UNSETTLED)
-        return plr_predict_accept(f, t_ns, reading, &planned);
+        return plr_predict_accept(f, t_ns, reading, planned, &step);
     plr_alignment_add(&f->belief, &f->source, &f->config, t_ns, reading);
     if (f->source.inertial.phase >= PLR_IMU_UNSETTLED)
         plr_filter_store_for_recovery(f);
-    const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
+    const plr_status status = plr_predict_accept(f, t_ns, reading, planned, &step);
     plr_guard_seal_whole(f); /* the start sets P */
     return status;
 }

@@ -39,7 +39,7 @@ typedef struct plr_process {
     void (*step)(plr_belief *belief, plr_motion *motion, plr_source *source, plr_time_ns t_ns,
                  const plr_process_step *step);
 
-    /* Fills `mean` and `whole` of the step that ends with `reading`: plr_mean_reading. */
+    /* Fills `mean` and `whole` of the step that ends with `reading`: plr_mean_reading. Its `interval` is known. */
     void (*mean)(const plr_belief *belief, const plr_source *source, plr_time_ns t_ns,
                  const plr_real reading[PLR_READING_DIM], plr_process_step *step);
 

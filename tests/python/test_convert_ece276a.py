@@ -17,7 +17,7 @@ from drives import (
     with_stale_tracks,
     with_turned_axes,
 )
-from pelorus.converters import ece276a, twist_noise
+from pelorus.converters import twist_noise
 from pelorus.io.recording import Recording
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
@@ -32,6 +32,7 @@ from pelorus.wire.frames import (
     Twist,
     TwistTiming,
 )
+from pelorus_course import ece276a
 
 
 def save_npz(path: Path, recording: Recording, edition: int = 2021, **changes: Any) -> Path:

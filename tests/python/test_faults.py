@@ -15,12 +15,13 @@ from drives import (
     with_stale_tracks,
     with_turned_axes,
 )
-from pelorus.faults import axes, lever, stale, timing
+from pelorus.faults import axes, lever, stale
 from pelorus.faults.mend import held_to_fit, mend
 from pelorus.io.recording import Recording
 from pelorus.math.axes import FORWARD_LEFT_UP_IN_CAMERA, body_axes, name, turns
 from pelorus.wire.frames import BodyAxes, TwistTiming
 from pelorus.wire.layout import Floats
+from pelorus_course import timing
 
 SEEDS = [1, 2]
 STALE = range(7, 590, 9)

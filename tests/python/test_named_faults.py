@@ -15,7 +15,6 @@ from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import ALIKE, OF_RECORDINGS, found_in, of_times, piece
 from pelorus.check.contents import recording_of, write
-from pelorus.converters import matlab
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.handeye import SEEN_MOST, first_part
 from pelorus.faults.identity import Jumps
@@ -23,6 +22,7 @@ from pelorus.faults.named import judged_of
 from pelorus.io.recording import Recording
 from pelorus.wire import framing
 from pelorus.wire.frames import Header, Kind, Stereo, Twist
+from pelorus_course import matlab
 from replay_drive import BIN, drive
 
 STEADY = ("--bias-velocity-sigma", "0", "--loss", "0.03", "--twist-rate", "50")

@@ -138,6 +138,7 @@ def test_every_command_works_from_the_wheel_alone(own_wheel: Path, tmp_path: Pat
     """In an environment of its own, which sees the dependencies of this one and no checkout."""
     assert "-py3-none-" in own_wheel.name  # of no version of Python
     packed = zipfile.ZipFile(own_wheel)
+    assert not [name for name in packed.namelist() if "course" in name]  # tools/course is apart
     assert sum(info.file_size for info in packed.infolist()) < 10e6
     environment = tmp_path / "environment"
     venv.create(environment, with_pip=False)

@@ -17,7 +17,6 @@ from draws import long_run
 from numpy.typing import NDArray
 from pelorus.check.checked import Checked, check, config_text
 from pelorus.check.contents import recording_of
-from pelorus.converters import matlab
 from pelorus.evaluate.evaluation import assess
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.named import judged_of
@@ -33,6 +32,7 @@ from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
 from pelorus.wire import framing
 from pelorus.wire.frames import Camera, TwistTiming
+from pelorus_course import matlab
 from replay_drive import BIN, judged
 
 Monkeypatch = pytest.MonkeyPatch

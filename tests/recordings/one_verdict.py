@@ -77,10 +77,12 @@ def _grade(words: str) -> str:
 
 
 def printed(*words: str) -> str:
-    """Returns what a command prints."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
-        pelorus(list(words))
+    """Returns what a command prints; one that fails ends the program, with its own words."""
+    out, complaints = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(complaints):
+        status = pelorus(list(words))
+    if status != 0:
+        raise SystemExit(f"pelorus {' '.join(words)} ended with {status}:\n{complaints.getvalue()}")
     return out.getvalue()
 
 

@@ -233,6 +233,7 @@ bool specimen_same_state(const plr_filter *a, const plr_filter *b) {
     memcpy(&copy.totals, &b->totals, sizeof copy.totals);
     memcpy(&copy.evidence, &b->evidence, sizeof copy.evidence); /* of one frame */
     memcpy(&copy.guard, &b->guard, sizeof copy.guard);
+    copy.source.unused = b->source.unused; /* a count, as those of the totals */
     return memcmp(&copy, b, sizeof copy) == 0 && a->totals.diverged_ns == b->totals.diverged_ns;
 }
 

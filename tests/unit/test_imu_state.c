@@ -101,6 +101,21 @@ static void test_what_it_knows_of_a_faulty_sensor_is_kept(void) {
     save_restore_and_go_on(3);
 }
 
+static void test_how_many_readings_were_refused_in_succession_is_kept(void) {
+    imu_rig_begin(IMU_RIG_GIVEN, 25);
+    imu_rig_fly(3);
+    const plr_imu imu = imu_rig_read();
+    for (unsigned k = 0; k < 900; k++) { /* 2.25 s, more than max-gap */
+        if (k == 700)                    /* less */
+            restore_from_now();
+        TEST_ASSERT_EQUAL_INT(PLR_E_TIME, plr_filter_inertial(f, 1, &imu));
+        if (k >= 700)
+            TEST_ASSERT_EQUAL_INT(PLR_E_TIME, plr_filter_inertial(&restored, 1, &imu));
+    }
+    TEST_ASSERT_TRUE(state_bytes_same_filter(f, &restored));
+    TEST_ASSERT_EQUAL_UINT32(900, restored.source.unused);
+}
+
 /* ---------------------------------------------------------------- after a power cut */
 
 /* The filter alone, on another clock than the flight's. */

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib import import_module
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import typer
@@ -16,8 +17,10 @@ from pelorus.program.console import out
 MODULES = {"try": "first_try"}  # commands whose file has another name
 
 
-def application(commands: Iterable[str]) -> typer.Typer:
-    """Returns the application with these commands, which are imported here."""
+def application(commands: Iterable[str], others: bool = False) -> typer.Typer:
+    """Returns the application with these commands, which are imported here; with `others`, also
+    those of other packages.
+    """
     app = typer.Typer(
         name="pelorus",
         help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",
@@ -26,8 +29,10 @@ def application(commands: Iterable[str]) -> typer.Typer:
         pretty_exceptions_enable=False,
         callback=_options,
     )
-    for command in commands:
-        added = import_module(f"pelorus.commands.{MODULES.get(command, command)}").app
+    names = (MODULES.get(command, command) for command in commands)
+    apps = [import_module(f"pelorus.commands.{name}").app for name in names]
+    apps += [entry.load() for entry in entry_points(group="pelorus.commands") if others]
+    for added in apps:
         guard_outputs(added)
         app.add_typer(added)
     return app

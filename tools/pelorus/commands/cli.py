@@ -3,6 +3,7 @@
 
 To add one: write commands/NAME.py with an `app` that has it, and name it in COMMANDS. Only
 the command that is called is imported: plotting takes longer to load than most of them to run.
+Another package adds a command by an entry point of the group pelorus.commands.
 Nothing is imported here before `main` is there to take a Ctrl-C.
 """
 
@@ -27,7 +28,6 @@ COMMANDS = (
     "simulate",
     "report",
     "map",
-    "course",
     "live",
     "stream",
     "compare",
@@ -77,7 +77,8 @@ def _run(words: list[str]) -> int:
     from pelorus.commands.application import application  # noqa: PLC0415
     from pelorus.errors import PelorusError, gives_up_output  # noqa: PLC0415
 
-    app = application(words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS)
+    is_ours = bool(words) and words[0] in COMMANDS
+    app = application(words[:1] if is_ours else COMMANDS, others=not is_ours)
     status = 0
     try:
         try:

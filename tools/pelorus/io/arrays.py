@@ -106,11 +106,6 @@ def read_npz(path: Path) -> Arrays:
     return Arrays(path, foreign.npz(path))
 
 
-def read_mat(path: Path) -> Arrays:
-    """Reads all variables of a MATLAB file up to version 7."""
-    return Arrays(path, foreign.mat(path))
-
-
 def camera_of(path: Path, fx: float, fy: float, cx: float, cy: float, baseline: float) -> Camera:
     """Returns the camera; raises an error if its numbers are impossible."""
     if min(fx, fy, baseline) <= 0:

@@ -27,7 +27,6 @@ from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from pelorus.errors import PelorusError
-from pelorus.io import matfile
 from pelorus.wire.layout import Floats
 
 TEXT_BYTES_MAX = 1 << 30
@@ -433,7 +432,7 @@ def _require_shallow(path: Path, words: str) -> None:
 
 def npz(path: Path) -> ArraysByName:
     """Reads all arrays of a .npz file; refuses pickled objects."""
-    _require_file(path)
+    require_file(path)
     expected = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
     if beginning(path).startswith(NPY_MAGIC):
         raise ForeignFileError(path, "is a lone array (.npy)", expected=expected)
@@ -460,21 +459,8 @@ def _require_unpackable(path: Path) -> None:
     _require_size(path, sum(member.file_size for member in members))
 
 
-def mat(path: Path) -> ArraysByName:
-    """Reads all variables of a MATLAB file of version 5 to 7."""
-    _require_file(path)
-    packed = content(path, ARRAYS_BYTES_MAX)
-    if matfile.is_hdf5(packed):
-        raise ForeignFileError(
-            path, "is a MATLAB 7.3 file (HDF5)", expected="save it with -v7 to convert it"
-        )
-    try:
-        return matfile.arrays(packed, ARRAYS_BYTES_MAX)
-    except matfile.BrokenMatFile as error:
-        raise ForeignFileError(path, f"cannot be read as .mat: {error}") from None
-
-
-def _require_file(path: Path) -> None:
+def require_file(path: Path) -> None:
+    """Refuses what is no file, an empty one, and one that is too large."""
     if path.is_dir():
         raise ForeignFileError(path, "is a folder", expected="one file of it is expected")
     if not path.is_file():

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from pelorus.wire.layout import Floats
 
@@ -43,12 +42,16 @@ def skew(x: ArrayLike) -> Floats:
 
 def exp(rho: ArrayLike, theta: ArrayLike) -> Poses:
     """Returns Exp(rho, theta) = (Exp theta, V rho)."""
+    from scipy.spatial.transform import RigidTransform  # noqa: PLC0415 - loads slowly
+
     T = RigidTransform.from_exp_coords(np.concatenate((theta, rho), axis=-1))
     return Poses(T.rotation.as_matrix(), T.translation)
 
 
 def log(T: Poses) -> Floats:
     """Returns the twist (..., 6) in the order (rho, theta) with Exp of it = T."""
+    from scipy.spatial.transform import RigidTransform, Rotation  # noqa: PLC0415 - loads slowly
+
     rigid = RigidTransform.from_components(T.p, Rotation.from_matrix(T.R))
     return np.roll(rigid.as_exp_coords(), 3, axis=-1)  # scipy's order is (theta, rho)
 

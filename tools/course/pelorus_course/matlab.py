@@ -14,8 +14,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
 from pelorus.errors import PelorusError
 from pelorus.io import arrays
 from pelorus.io.arrays import Arrays
@@ -26,6 +24,9 @@ from pelorus.math.axes import body_axes
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
 from pelorus.wire.layout import Floats
+from scipy.spatial.transform import Rotation
+
+from pelorus_course.mat import read_mat
 
 LANDMARK_SIGMA_M = 0.01  # Starry Night's map was surveyed by motion capture
 
@@ -36,7 +37,7 @@ def starry_night(
     landmark_sigma_m: float = LANDMARK_SIGMA_M,
 ) -> Recording:
     """Reads a drive with the noise variances of the file and its landmarks as LANDMARK(known)."""
-    file = arrays.read_mat(source)
+    file = read_mat(source)
     recording = _read(file, twist_timing)
     if not 0 < landmark_sigma_m < np.inf:
         raise PelorusError(f"landmark sigma {landmark_sigma_m} m: must be positive")
@@ -53,7 +54,7 @@ def starry_night(
 
 def klt(source: Path, twist_timing: TwistTiming = TwistTiming.MID) -> Recording:
     """Reads a drive with the OXTS poses of the file as TRUTH."""
-    return _read(arrays.read_mat(source), twist_timing)
+    return _read(read_mat(source), twist_timing)
 
 
 def _read(file: Arrays, twist_timing: TwistTiming) -> Recording:

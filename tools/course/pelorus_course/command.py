@@ -8,9 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.markup import escape
-from rich.table import Table
-
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.errors import Existing, PelorusError, made, write_text
 from pelorus.evaluate import road
@@ -20,9 +17,11 @@ from pelorus.program.console import err, out
 from pelorus.program.extras import figures_missing
 from pelorus.report.results import Subject, read_subject
 from pelorus.wire.packed_file import bare_name
+from rich.markup import escape
+from rich.table import Table
 
 if TYPE_CHECKING:
-    from pelorus.course.trial import Reference, Trial
+    from pelorus_course.trial import Reference, Trial
 
 FIGURE_1, FIGURE_2, TABLE = "figure1.png", "figure2.png", "table.md"
 
@@ -69,7 +68,7 @@ def course(
     truth or road, with the landmarks. Figure 2: the trace of the covariance, of the whole map and
     of the state. docs/COURSE.md says what they show.
     """
-    from pelorus.course import trial  # noqa: PLC0415 - scipy loads slowly
+    from pelorus_course import trial  # noqa: PLC0415 - scipy loads slowly
 
     Existing.keep(folder / TABLE)
     options = _options(configs, settings, recordings)
@@ -112,7 +111,7 @@ def _references(
     subjects: list[Subject], truth: Path | None, road_file: Path | None
 ) -> list[tuple[Subject, Reference]]:
     """Returns each recording with its reference."""
-    from pelorus.course.trial import Reference  # noqa: PLC0415 - as above
+    from pelorus_course.trial import Reference  # noqa: PLC0415 - as above
 
     if truth is not None and road_file is not None:
         raise typer.BadParameter("one of them, not both", param_hint="--truth / --road")
@@ -139,7 +138,7 @@ def _references(
 
 
 def _publish(trials: list[Trial], folder: Path) -> None:
-    from pelorus.course import table  # noqa: PLC0415 - as above
+    from pelorus_course import table  # noqa: PLC0415 - as above
 
     text = table.markdown(trials)
     names = _draw(trials, folder)
@@ -163,8 +162,9 @@ def _draw(trials: list[Trial], folder: Path) -> tuple[str, ...]:
     if missing := figures_missing():
         err.print(escape(f"the table comes without figures: {missing}"))
         return ()
-    from pelorus.course import pictures  # noqa: PLC0415 - as above
     from pelorus.program import style  # noqa: PLC0415 - an extra
+
+    from pelorus_course import pictures  # noqa: PLC0415 - as above
 
     style.save(lambda: pictures.figure_1(trials), folder / FIGURE_1)
     style.save(lambda: pictures.figure_2(trials), folder / FIGURE_2)

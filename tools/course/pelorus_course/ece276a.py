@@ -13,9 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
 from pelorus.converters import twist_noise
-from pelorus.faults import stale, timing
+from pelorus.faults import stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
 from pelorus.io import arrays, trajectory
@@ -27,6 +26,8 @@ from pelorus.math import se3
 from pelorus.math.axes import body_axes
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import Header, TwistTiming, header_name
+
+from pelorus_course import timing
 
 
 def convert(

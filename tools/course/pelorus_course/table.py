@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from pelorus.course.trial import NAMES, Trial
 from pelorus.evaluate.evaluation import step_change
 from pelorus.report.words import NONE, POSE_KEYS, number
 from pelorus.wire.layout import Floats
+
+from pelorus_course.trial import NAMES, Trial
 
 TITLES = (
     "recording",

@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-
 from pelorus.errors import PelorusError
 from pelorus.evaluate import road
 from pelorus.evaluate.road import RoadFit

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
-from pelorus.course.trial import NAMES, Trial
 from pelorus.program.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
 from pelorus.report.results import OWN
 from pelorus.report.top_view import Box, around
 from pelorus.wire.layout import Floats
+
+from pelorus_course.trial import NAMES, Trial
 
 COLUMN_IN, HEIGHT_1_IN, HEIGHT_2_IN = 7.0, 6.4, 6.0
 MARGIN = 0.08  # of the larger side
