@@ -32,7 +32,7 @@ static uint64_t moving_sum(const plr_filter *f) {
     ADD_BETWEEN(&sum, f, camera.estimate.rate, source);
     ADD_BETWEEN(&sum, f, source.reading_ns, belief.slots);
     ADD_BETWEEN(&sum, f, frames_off_the_map, guard);
-    if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
+    if (f->config.process == PLR_PROCESS_IMU && f->source.inertial.phase < PLR_IMU_UNSETTLED)
         plr_checksum_add(&sum, &f->source.alignment, sizeof f->source.alignment);
     if (f->source.velocities_known)
         plr_checksum_add(&sum, &f->source.velocities, sizeof f->source.velocities);
@@ -132,7 +132,8 @@ plr_status plr_guard_check_reading(const plr_filter *f) {
     if (status != PLR_OK)
         return status;
     const bool imu = f->config.process == PLR_PROCESS_IMU;
-    const bool uses_told = imu ? !f->source.inertial.started : f->source.velocities_known;
+    const bool uses_told =
+        imu ? f->source.inertial.phase < PLR_IMU_UNSETTLED : f->source.velocities_known;
     return uses_told && told_sum(f) != f->guard.told ? PLR_E_DAMAGED : PLR_OK;
 }
 

@@ -20,7 +20,10 @@ plr_status plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
 plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
                               plr_status planned, const plr_process_step *step);
 
-/* Applies D' to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
+/* Counts a reading that is refused, and returns the status. While none is taken the pose's covariance grows. */
+plr_status plr_predict_refuse(plr_filter *f, plr_status status);
+
+/* Applies a motion D' (state/motion.h) to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
  * noise is kept in work.noise, not in P, until plr_covariance_close_noise. PLR_E_DIVERGED if a variance is
  * no longer positive; likewise the two below. */
 plr_status plr_predict_apply(plr_filter *f, const plr_applied_motion *applied);

@@ -102,7 +102,7 @@ extern const plr_process plr_process_imu;
 
 /* False until an IMU is aligned with gravity; until then the state rests, but for mapping. */
 static inline bool plr_process_has_started(const plr_source *source) {
-    return source->process != PLR_PROCESS_IMU || source->inertial.started != 0 ||
+    return source->process != PLR_PROCESS_IMU || source->inertial.phase >= PLR_IMU_UNSETTLED ||
            source->poses_are_given;
 }
 

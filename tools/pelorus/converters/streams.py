@@ -17,18 +17,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.console import progress
 from pelorus.converters import earth_start, full_scale, repeated, twist_noise
 from pelorus.errors import PelorusError
 from pelorus.faults import resolution, stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
-from pelorus.inertial import NO_READINGS, Inertial
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.recording import Recording
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.io.trajectory import Trajectory, filled
+from pelorus.math.inertial import NO_READINGS, Inertial
+from pelorus.math.motion import Times
+from pelorus.program.console import progress
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray, Rectification
@@ -36,8 +36,8 @@ from pelorus.rig.rig import Rig
 from pelorus.tracking import images
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
-from pelorus.tracks import Tracks
-from pelorus.trajectory import Trajectory, filled
+from pelorus.wire.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
+from pelorus.wire.layout import Floats
 
 FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
