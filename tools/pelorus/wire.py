@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from pelorus import calibrated, cobs, evidence, packed_file, schema
+from pelorus import calibrated, cobs, evidence, image, packed_file, schema
 from pelorus.console import progress
 from pelorus.errors import PelorusError, whole, writing
 from pelorus.frames import End, Header, Kind, Message
@@ -29,7 +29,7 @@ STUFFED_BYTES_MAX = 1 << 20  # ten times this version's longest frame; limits th
 HOPELESS_BYTES = 1 << 20  # after so many bytes without a good frame no more will come
 SEQUENCE_MODULUS = 1 << 16
 KINDS: dict[int, type[Message]] = {cls.kind: cls for cls in Message.__subclasses__()}
-assert {evidence.Evidence, calibrated.Calibrated} <= set(KINDS.values())
+assert {evidence.Evidence, calibrated.Calibrated, image.Image} <= set(KINDS.values())
 FAULTS_KEPT = 100  # the first ones are remembered with their place, all are counted
 
 
