@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "eyes/motion.h"
+#include "eyes/expect.h"
 
 /* By what share HEADER's baseline may differ from that of the rig. */
 #define SAME_BASELINE 1e-3

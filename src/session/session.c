@@ -8,8 +8,8 @@
 #include "session/events.h"
 #include "session/layers.h"
 #include "session/line.h"
+#include "session/look.h"
 #include "session/phase.h"
-#include "session/pictures.h"
 #include "session/plausible.h"
 #include "session/saving.h"
 #include "session/send.h"
@@ -106,8 +106,8 @@ static const struct {
     [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_twist},
     [PLR_KIND_IMU]      = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_imu},
     [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_stereo},
-    [PLR_KIND_IMAGE]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_pictures_take},
-    [PLR_KIND_RIG]      = {{EARLY,  USE,   USE,     SAME,    SAME,    SAME}, plr_pictures_take_rig},
+    [PLR_KIND_IMAGE]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_look_take},
+    [PLR_KIND_RIG]      = {{EARLY,  USE,   USE,     SAME,    SAME,    SAME}, plr_look_take_rig},
     [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_events_take_truth},
     [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_reading},
     [PLR_KIND_STATE]    = {{EARLY,  EARLY, EARLY,   USE,     USE,     USE},  save},
@@ -235,7 +235,7 @@ plr_status plr_session_look(plr_session *s, const plr_picture_pair *pair) {
     memset(&s->in, 0, sizeof s->in);
     s->in.kind = PLR_KIND_IMAGE;
     s->in.as.image.t_ns = pair->left.t_ns;
-    return enter(s, PLR_KIND_IMAGE) == USE ? plr_pictures_look(s, pair) : PLR_E_NOT_READY;
+    return enter(s, PLR_KIND_IMAGE) == USE ? plr_look_at(s, pair) : PLR_E_NOT_READY;
 }
 
 /* --- the loop --- */

@@ -91,7 +91,7 @@ SESSION_PARTS = (
     "state_store",
 )
 SESSION_FILES = (
-    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "use", "events", "pictures"),
+    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "use", "events", "look"),
     "session",
 )
 # What a public header may include of its siblings: wire.h must stay free of the filter.

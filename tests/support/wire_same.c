@@ -232,6 +232,13 @@ static void same_state(const plr_state_message *e, const plr_state_message *a) {
     SAME(moved_variance);
 }
 
+static void same_pictures(const plr_message *e, const plr_message *a) {
+    if (e->kind == PLR_KIND_IMAGE)
+        same_image(&e->as.image, &a->as.image);
+    else
+        same_rig(&e->as.rig, &a->as.rig);
+}
+
 void wire_assert_same(const plr_message *e, const plr_message *a) {
     TEST_ASSERT_EQUAL_INT(e->kind, a->kind);
     switch (e->kind) {
@@ -284,10 +291,8 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         same_imu(&e->as.imu, &a->as.imu);
         break;
     case PLR_KIND_IMAGE:
-        same_image(&e->as.image, &a->as.image);
-        break;
     case PLR_KIND_RIG:
-        same_rig(&e->as.rig, &a->as.rig);
+        same_pictures(e, a);
         break;
     case PLR_KIND_NONE:
         break;

@@ -346,9 +346,7 @@ static void make_pictures(plr_message *m, unsigned variant) {
 }
 
 plr_message wire_sample(plr_kind kind, unsigned variant) {
-    plr_message m;
-    memset(&m, 0, sizeof m);
-    m.kind = kind;
+    plr_message m = {.kind = kind};
     switch (kind) {
     case PLR_KIND_HEADER:
         make_header(&m.as.header, variant);

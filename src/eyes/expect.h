@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* The motion that a pair is looked at with: what the filter said of its velocity since the last one. */
-#ifndef PLR_EYES_MOTION_H
-#define PLR_EYES_MOTION_H
+#ifndef PLR_EYES_EXPECT_H
+#define PLR_EYES_EXPECT_H
 
 #include "pelorus/eyes.h"
 

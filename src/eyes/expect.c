@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "eyes/motion.h"
+#include "eyes/expect.h"
 
 #include "math/small.h"
 #include "math/so3.h"

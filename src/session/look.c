@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "session/pictures.h"
+#include "session/look.h"
 
 #include "session/events.h"
 #include "session/line.h"
@@ -112,7 +112,7 @@ static bool place_is_known(const plr_session *s) {
     return true;
 }
 
-plr_status plr_pictures_look(plr_session *s, const plr_picture_pair *pair) {
+plr_status plr_look_at(plr_session *s, const plr_picture_pair *pair) {
     plr_eyes *eyes = s->options.eyes;
     plr_frame frame;
     const plr_status status = eyes->calls->look(eyes, pair, place_is_known(s), &frame);
@@ -131,7 +131,7 @@ plr_status plr_pictures_look(plr_session *s, const plr_picture_pair *pair) {
 
 /* --- messages --- */
 
-void plr_pictures_take_rig(plr_session *s) {
+void plr_look_take_rig(plr_session *s) {
     plr_eyes *eyes = s->options.eyes;
     if (eyes == NULL)
         return;
@@ -139,7 +139,7 @@ void plr_pictures_take_rig(plr_session *s) {
     eyes->has_rig = true;
 }
 
-void plr_pictures_take(plr_session *s) {
+void plr_look_take(plr_session *s) {
     plr_eyes *eyes = s->options.eyes;
     plr_picture_pair pair;
     if (eyes == NULL) {
@@ -151,5 +151,5 @@ void plr_pictures_take(plr_session *s) {
     if (status != PLR_OK && (eyes->status == PLR_OK || s->totals.images == 1))
         refuse(s, s->in.as.image.t_ns, status);
     if (pair.left.pixels != NULL)
-        (void)plr_pictures_look(s, &pair);
+        (void)plr_look_at(s, &pair);
 }
