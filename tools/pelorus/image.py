@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, ClassVar, NamedTuple, Self
@@ -95,6 +95,31 @@ class TimedPair(NamedTuple):
     t_right_ns: int
     left: Grey
     right: Grey
+
+
+@dataclass(frozen=True)
+class PicturesOf:
+    """The pictures of a recording, of one size; `read` yields them in order, anew at each call."""
+
+    t_ns: NDArray[np.int64]
+    width_px: int
+    height_px: int
+    read: Callable[[], Iterator[TimedPair]]
+    rig: RigMessage | None = None  # where they are not rectified
+
+    def __len__(self) -> int:
+        """Returns the number of their messages."""
+        return 2 * len(self.t_ns) * -(-self.width_px * self.height_px // BAND_PIXELS)
+
+    def messages(self) -> Iterator[tuple[int, Image]]:
+        """Yields them with the time at which they come: when the pair is whole."""
+        for pair in self.read():
+            for t_ns, side, picture in (
+                (pair.t_ns, Side.LEFT, pair.left),
+                (pair.t_right_ns, Side.RIGHT, pair.right),
+            ):
+                for band in bands_of(t_ns, side, picture):
+                    yield max(pair.t_ns, pair.t_right_ns), band
 
 
 @dataclass

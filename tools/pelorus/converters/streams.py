@@ -103,6 +103,7 @@ class Asked:
     timing: TwistTiming | None = None
     fix: bool = True
     remarks: tuple[str, ...] = ()
+    keep_pictures: bool = False
 
 
 @dataclass(frozen=True)
