@@ -11,7 +11,7 @@ set(spent_in ${PELORUS_SOURCES})
 list(FILTER spent_in INCLUDE REGEX "/src/(math/(blocks3|dense|packed|se3|so3)|process/(imu|twist)|sensor/stereo|\
 state/(covariance[a-z_]*|model_body|polar|rigid_fit)|\
 filter/(correction|guard|motion_first|search)|\
-vision/(corners|patch|pyramid|rig|lens|track))\\.c$")
+vision/(corners|lens|patch|pyramid|rig|track|vision|watch))\\.c$")
 set_source_files_properties(${spent_in} PROPERTIES COMPILE_OPTIONS -O3)
 
 set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
@@ -171,13 +171,14 @@ function(cortexm_eyes board)
   cortexm_image(eyes-${board} ${board} ${library} 32
     "${PORT}/main_firmware.c" "${PORT}/port_serial.c" "${PORT}/eyes_static.c" "${PORT}/telemetry_none.c")
   add_dependencies(eyes eyes-${board})
-  if(NOT PELORUS_EYES_RECORDING)
+  set(recording "${PELORUS_EYES_RECORDINGS}/${board}.plr")
+  if(NOT PELORUS_EYES_RECORDINGS OR NOT EXISTS "${recording}")
     return()
   endif()
   cortexm_image(eyes-replay-${board} ${board} ${library} 32
     "${PORT}/main_eyes.c" "${PORT}/eyes_static.c" "${PORT}/bench_recording.S")
-  target_compile_definitions(eyes-replay-${board} PRIVATE "BENCH_RECORDING=\"${PELORUS_EYES_RECORDING}\"")
-  set_source_files_properties("${PORT}/bench_recording.S" PROPERTIES OBJECT_DEPENDS "${PELORUS_EYES_RECORDING}")
+  target_compile_definitions(eyes-replay-${board} PRIVATE "BENCH_RECORDING=\"${recording}\"")
+  set_property(SOURCE "${PORT}/bench_recording.S" APPEND PROPERTY OBJECT_DEPENDS "${recording}")
   if(PELORUS_CCM_ORIGIN)
     target_link_options(eyes-replay-${board} PRIVATE "-Wl,--defsym=CCM_ORIGIN=${PELORUS_CCM_ORIGIN}")
   endif()
