@@ -106,7 +106,7 @@ ensure_python() {
     local wanted
     python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
         die "Python $(python3 -V 2>&1 | cut -d' ' -f2) is too old: 3.11 or later is needed"
-    wanted="$ROOT $(python3 -V) $(cat "$lock" "$ROOT/pyproject.toml" | sha256sum)"
+    wanted="$ROOT $(python3 -V) $(cat "$lock" "$ROOT/pyproject.toml" "$ROOT/tools/course/pyproject.toml" | sha256sum)"
     if [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then
         echo 'Python environment: up to date'
         return 0
@@ -119,7 +119,7 @@ ensure_python() {
         die 'pip could not install tools/requirements.lock: is there a network?'
     # The sources as they are, without the library: that one comes from build/bin.
     "$VENV/bin/python" -m pip install --quiet --no-deps --no-build-isolation \
-        --config-settings=wheel.cmake=false --config-settings=editable.mode=inplace --editable "$ROOT" ||
+        --config-settings=wheel.cmake=false --config-settings=editable.mode=inplace --editable "$ROOT" --editable "$ROOT/tools/course" ||
         die 'pip could not install the tools'
     printf '%s' "$wanted" >"$stamp"
 }

@@ -96,7 +96,10 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
  * PLR_E_TIME not later than the last reading, or earlier than the last frame; PLR_E_GAP more than
  * max_gap_s ahead; PLR_E_NOT_FINITE; PLR_E_RANGE the step to t_ns, or a next step of the same
  * length with this reading, would be more than pi rad or 1 km; PLR_E_MODE the process is another.
- */
+ * If readings are refused for longer than max_gap_s (at their usual rate) and no frame is taken either, as after
+ * a clock that started again, the pose's covariance grows by the way that the body may have gone since: follow the
+ * clock with plr_filter_resume. Of readings that share a stamp (a FIFO that is read at once) the first is
+ * taken and the others are PLR_E_TIME: give each its own time. */
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist);
 
 /* With the setting process = imu, in place of plr_filter_predict: a reading of accelerometer and

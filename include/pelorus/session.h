@@ -188,7 +188,7 @@ typedef struct plr_session {
     plr_time_ns newest_ns[PLR_EVENT_KINDS]; /* the newest time of each kind that arrived */
     plr_step_order order;
     plr_known_map known;
-    plr_clock_watch watch;
+    plr_clock_watch watch, step_watch; /* of all, and of the steps alone */
     plr_budget budget;
     uint64_t predict_ns;   /* computing time since the last frame */
     plr_report last;       /* of the last frame */

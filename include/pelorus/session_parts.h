@@ -80,6 +80,10 @@ typedef struct plr_step_order {
     plr_time_ns ahead_ns;   /* how far that was ahead of the newest step */
     plr_time_ns late_ns;    /* used_ns when a step last came too late; 0: none did */
     plr_time_ns told_ns;    /* the delay that the last TEXT about it asked for */
+    plr_time_ns shared_ns;  /* the stamp of the last step that was refused for its time */
+    unsigned shared;        /* so many in succession had that one */
+    bool told_shared;       /* a TEXT has said so */
+    bool told_clock;        /* and one that the steps' clock is not the frames' */
 } plr_step_order;
 
 /* Landmarks of known position, ascending by id. */

@@ -96,6 +96,13 @@ static void add_missed(plr_filter *f, plr_real h0, plr_real h1, const plr_real *
         f->motion.Q[(PLR_POSE_DIM + 1) * i] += variance[i];
 }
 
+/* The filter's time moves. */
+static void set_time(plr_filter *f, plr_time_ns t_ns) {
+    f->belief.t_ns = t_ns;
+    f->clock_started = 1;
+    f->source.unused = 0;
+}
+
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
     if (f->clock_started && t_ns > f->belief.t_ns && plr_process_has_started(&f->source)) {
         const plr_time_ns since = f->source.reading_valid ? f->source.reading_ns : f->belief.t_ns;
@@ -107,8 +114,65 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
         take_step(f, t_ns, &step);
         add_missed(f, h0, h1, NULL);
     }
-    f->belief.t_ns = t_ns;
-    f->clock_started = 1;
+    set_time(f, t_ns);
+}
+
+/* ---------------------------------------------------------------- refused readings */
+
+/* What nobody knows of a pose: (1 km)^2, and of an angle pi^2 / 3. */
+#define UNKNOWN_WAY2  PLR_R(1e6)
+#define UNKNOWN_TURN2 PLR_R(3.29)
+/* The variance of the rate of a body that an IMU moves, each axis, (rad/s)^2. */
+#define USUAL_RATE2 PLR_R(1)
+
+/* The squares of what may be the body's speed and rate: as they were last, and with what they may have changed by. */
+static void speeds2(const plr_filter *f, plr_real *speed2, plr_real *rate2) {
+    plr_real u[PLR_POSE_DIM];
+    const plr_source *source = &f->source;
+    const bool inertial = source->process == PLR_PROCESS_IMU;
+    plr_process_of(source)->now(&f->belief, &f->motion, source, u, NULL);
+    *speed2 = plr_dot3(u, u);
+    *rate2 = plr_dot3(u + 3, u + 3);
+    for (unsigned i = 0; i < 3; i++) {
+        *speed2 += inertial ? source->start_velocity_variance : source->velocity_variance[i];
+        *rate2 += inertial ? USUAL_RATE2 : source->gyro_variance[i];
+    }
+}
+
+static plr_real at_most(plr_real x, plr_real most) {
+    return x < most ? x : most;
+}
+
+/* The filter's time stands still while readings come that it does not take: their times are wrong, or another clock's.
+ * The body moves on. Once they are more than max-gap would hold, the pose may be wrong by the way of all of them: what
+ * the last one adds is the motion's noise. */
+static void open_by_refused(plr_filter *f) {
+    const plr_real usual = f->source.inertial.usual_s;
+    const plr_real now = usual * (plr_real)f->source.unused, before = now - usual;
+    const plr_real gap = plr_seconds(f->par.max_gap_ns);
+    plr_real speed2, rate2;
+    if (!(now > gap) || !plr_process_has_started(&f->source))
+        return;
+    const plr_real from2 = before > gap ? before * before : PLR_R(0), to2 = now * now;
+    speeds2(f, &speed2, &rate2);
+    const plr_real way2 =
+        at_most(speed2 * to2, UNKNOWN_WAY2) - at_most(speed2 * from2, UNKNOWN_WAY2);
+    const plr_real turn2 =
+        at_most(rate2 * to2, UNKNOWN_TURN2) - at_most(rate2 * from2, UNKNOWN_TURN2);
+    for (unsigned i = 0; i < 3; i++) {
+        f->motion.Q[(PLR_POSE_DIM + 1) * i] += way2;
+        f->motion.Q[(PLR_POSE_DIM + 1) * (3 + i)] += turn2;
+    }
+    f->motion.pending = f->motion.noisy = 1;
+}
+
+plr_status plr_predict_refuse(plr_filter *f, plr_status status) {
+    f->totals.twists_refused++;
+    if (status != PLR_E_MODE) {
+        f->source.unused += f->source.unused < UINT32_MAX;
+        open_by_refused(f);
+    }
+    return plr_filter_refuse(f, status);
 }
 
 /* ---------------------------------------------------------------- twists */
@@ -143,73 +207,66 @@ static void store_reading(plr_filter *f, plr_time_ns t_ns, const plr_real readin
     f->totals.twists++;
 }
 
-static plr_status refuse_twist(plr_filter *f, plr_status status) {
-    f->totals.twists_refused++;
-    return plr_filter_refuse(f, status);
-}
-
-plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
-                                  const plr_real reading[PLR_POSE_DIM]) {
-    plr_planned_step planned = {.status = PLR_OK};
+plr_status plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
+                            const plr_real reading[PLR_POSE_DIM], plr_process_step *step) {
     if (f->config.mode == PLR_MODE_MAPPING)
-        return planned;
-    planned.status = check_time(f, t_ns);
-    if (planned.status != PLR_OK)
-        return planned;
-    plr_process_step *step = &planned.step;
-    plr_process_of(&f->source)->mean(&f->belief, &f->source, t_ns, reading, step);
+        return PLR_OK;
+    const plr_status status = check_time(f, t_ns);
+    if (status != PLR_OK)
+        return status;
     step->seconds = f->clock_started ? plr_seconds(t_ns - f->belief.t_ns) : 0;
-    step->interval =
-        f->source.reading_valid ? plr_seconds(t_ns - f->source.reading_ns) : step->seconds;
+    step->interval = f->source.reading_valid && f->source.reading_ns != f->belief.t_ns
+                         ? plr_seconds(t_ns - f->source.reading_ns)
+                         : step->seconds;
+    plr_process_of(&f->source)->mean(&f->belief, &f->source, t_ns, reading, step);
     if (plr_process_of(&f->source)->check(&f->belief, &f->source, step->mean, step->seconds) !=
             PLR_OK ||
         check_reading(f, reading, step->interval) != PLR_OK)
-        planned.status = PLR_E_RANGE;
-    return planned;
+        return PLR_E_RANGE;
+    return PLR_OK;
 }
 
 plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                              const plr_planned_step *planned) {
-    if (planned->status != PLR_OK)
-        return refuse_twist(f, planned->status);
+                              plr_status planned, const plr_process_step *step) {
+    if (planned != PLR_OK)
+        return plr_predict_refuse(f, planned);
     if (f->config.mode == PLR_MODE_MAPPING) {
         f->totals.twists++;
         plr_guard_seal(f);
         return PLR_OK;
     }
-    const plr_process_step *step = &planned->step;
     if (step->seconds > 0 && plr_process_has_started(&f->source)) {
         take_step(f, t_ns, step);
         add_missed(f, step->interval - step->seconds, step->interval, reading);
     }
-    f->belief.t_ns = t_ns;
-    f->clock_started = 1;
+    set_time(f, t_ns);
     store_reading(f, t_ns, reading, step->interval);
     plr_guard_seal(f);
     return PLR_OK;
 }
 
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
-    const plr_status sound = twist ? plr_guard_check(f) : PLR_E_ARGUMENT;
+    const plr_status sound = twist ? plr_guard_check_reading(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.process != PLR_PROCESS_TWIST)
-        return refuse_twist(f, PLR_E_MODE);
+        return plr_predict_refuse(f, PLR_E_MODE);
     if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
-        return refuse_twist(f, PLR_E_NOT_FINITE);
+        return plr_predict_refuse(f, PLR_E_NOT_FINITE);
 
     plr_real reading[PLR_POSE_DIM];
     for (int i = 0; i < 3; i++) {
         reading[i] = (plr_real)twist->v_B_mps[i];
         reading[3 + i] = (plr_real)twist->w_B_radps[i];
         if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
-            return refuse_twist(f, PLR_E_RANGE);
+            return plr_predict_refuse(f, PLR_E_RANGE);
     }
-    const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
-    if (planned.status == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
+    plr_process_step step;
+    const plr_status planned = plr_predict_plan(f, t_ns, reading, &step);
+    if (planned == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
         plr_real change2[2];
         plr_statistics_change(&f->source, reading, change2);
-        plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
+        plr_statistics_learn(&f->belief, &f->source, t_ns, reading, step.interval, change2);
     }
-    return plr_predict_accept(f, t_ns, reading, &planned);
+    return plr_predict_accept(f, t_ns, reading, planned, &step);
 }

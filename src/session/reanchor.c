@@ -82,6 +82,22 @@ static plr_status covariance_after(double P[36], const plr_filter *f, double sec
     return PLR_OK;
 }
 
+void plr_reanchor_tell_counter(plr_text *line, plr_time_ns from_ns, plr_time_ns to_ns) {
+    static const struct {
+        uint64_t ns;
+        const char *name;
+    } units[] = {{1, "nanoseconds"}, {1000, "microseconds"}, {1000000, "milliseconds"}};
+    const plr_time_ns near_ns = UINT64_C(1000000000);
+    for (unsigned i = 0; i < sizeof units / sizeof *units; i++) {
+        const plr_time_ns round_ns = units[i].ns << 32;
+        if (from_ns <= to_ns || distance_ns(from_ns - to_ns, round_ns) > near_ns)
+            continue;
+        plr_line_text(line, ". So do 32-bit ");
+        plr_line_text(line, units[i].name);
+        plr_line_text(line, " that wrap: count in 64 bits");
+    }
+}
+
 static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
     plr_text *line = &s->out.as.text;
     plr_line_begin(line, PLR_SEVERITY_WARNING, "the clock jumped from ");
@@ -90,6 +106,7 @@ static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
     plr_line_time(line, to_ns);
     plr_line_text(line, ", further than max-gap; three messages agree, so it is followed: "
                         "landmarks leave, the pose stays with a wider covariance");
+    plr_reanchor_tell_counter(line, from_ns, to_ns);
     plr_send_text(s);
 }
 

@@ -41,4 +41,8 @@ bool plr_clock_was_set_back(const plr_session *s, plr_time_ns newest_ns, plr_tim
  * time is to be believed now. True if it did: the filter will accept the same data. */
 bool plr_reanchor_follow(plr_session *s, plr_time_ns t_ns, plr_status status);
 
+/* Adds to a line about a jump from one time to another whether a counter of 32 bits makes such a one when it starts
+ * again. */
+void plr_reanchor_tell_counter(plr_text *line, plr_time_ns from_ns, plr_time_ns to_ns);
+
 #endif

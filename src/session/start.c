@@ -32,7 +32,7 @@ void plr_start_clear(plr_session *s) {
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
     for (unsigned i = 0; i < s->options.map_count; i++)
         (void)plr_known_map_add(&s->known, &s->options.map[i]); /* plr_session_init has checked */
-    s->watch.agreeing = 0;
+    s->watch.agreeing = s->step_watch.agreeing = 0;
     if (s->options.eyes != NULL)
         s->options.eyes->calls->clear(s->options.eyes);
     plr_budget_init(&s->budget, s->options.deadline_us);

@@ -17,6 +17,10 @@ static bool is_inertial(const plr_session *s) {
     return plr_filter_config(&s->filter)->process == PLR_PROCESS_IMU;
 }
 
+static const char *steps_of(const plr_session *s) {
+    return is_inertial(s) ? "IMU readings" : "TWISTs";
+}
+
 /* The filter used a frame, or a reading of a small sensor, of this time. */
 static void note_used(plr_session *s, plr_time_ns t_ns) {
     plr_step_order *order = &s->order;
@@ -48,7 +52,7 @@ static void note_late(plr_session *s, plr_time_ns t_ns) {
     if (needed_ns < 2 * order->told_ns || needed_ns > plr_clock_max_gap_ns(s))
         return;
     order->told_ns = needed_ns;
-    plr_line_begin(line, PLR_SEVERITY_WARNING, is_inertial(s) ? "IMU readings" : "TWISTs");
+    plr_line_begin(line, PLR_SEVERITY_WARNING, steps_of(s));
     plr_line_text(line, " come late: what was used before them is newer, here by ");
     plr_line_time(line, needed_ns + 999999); /* upwards, for it is to be enough */
     plr_line_text(line, ", and they are refused. Set twist-delay to that or more: then frames and "
@@ -81,6 +85,42 @@ static void report_fault(plr_session *s) {
     plr_send_text(s);
 }
 
+/* A FIFO that is read at once gives all that it held one stamp. A link doubles a message, and no more: three of
+ * one time are told, once in a drive. */
+static void note_shared(plr_session *s, plr_time_ns t_ns, plr_status status) {
+    plr_step_order *order = &s->order;
+    if (status != PLR_E_TIME)
+        return;
+    order->shared = order->shared_ns == t_ns ? order->shared + 1 : 1;
+    order->shared_ns = t_ns;
+    if (order->shared < 2 || order->told_shared || !order->stepped || t_ns != order->stepped_ns)
+        return;
+    order->told_shared = true;
+    plr_line_begin(&s->out.as.text, PLR_SEVERITY_WARNING, steps_of(s));
+    plr_line_text(&s->out.as.text,
+                  " share a stamp, as of a FIFO that is read at once: of each stamp the first is "
+                  "used, and the others are refused. Give each its own time");
+    plr_send_text(s);
+}
+
+/* Steps of another clock, while frames go on with theirs: three that agree are told, once in a drive. */
+static void note_other_clock(plr_session *s, plr_time_ns t_ns, plr_status status) {
+    const plr_time_ns now_ns = plr_filter_time(&s->filter);
+    plr_text *line = &s->out.as.text;
+    if (!plr_clock_watch_note(&s->step_watch, t_ns, status, now_ns, plr_clock_max_gap_ns(s)) ||
+        s->order.told_clock)
+        return;
+    s->order.told_clock = true;
+    plr_line_begin(line, PLR_SEVERITY_WARNING, steps_of(s));
+    plr_line_text(line, " are of another clock: ");
+    plr_line_time(line, t_ns);
+    plr_line_text(line, " beside ");
+    plr_line_time(line, now_ns);
+    plr_line_text(line, " of what was used last, further than max-gap, so they are refused");
+    plr_reanchor_tell_counter(line, now_ns, t_ns);
+    plr_send_text(s);
+}
+
 static plr_status predict(plr_session *s, const plr_event *step) {
     const plr_moved_by *by = &step->as.step;
     const uint64_t begin = plr_clock_now_ns(s);
@@ -110,7 +150,10 @@ static void use_step(plr_session *s, const plr_event *step) {
         note_late(s, step->t_ns);
     if (is_inertial(s))
         report_fault(s);
+    if (step->leads || status == PLR_OK)
+        note_other_clock(s, step->t_ns, status);
     if (status != PLR_OK) {
+        note_shared(s, step->t_ns, status);
         refuse_step(s, step->t_ns, late ? PLR_E_LATE : status);
         return;
     }

@@ -19,10 +19,11 @@ from pathlib import Path
 FOLDERS: dict[str, set[str]] = {
     "math": {"math"},
     "record": {"record"},
+    "limits": {"limits"},
     "state": {"state", "math"},
-    "process": {"process", "state", "math"},
+    "process": {"process", "state", "limits", "math"},
     "sensor": {"sensor", "state", "math"},
-    "supervise": {"supervise", "math"},
+    "supervise": {"supervise", "limits", "math"},
     "known_map": {"known_map", "sensor", "state", "math"},
     "vision": {"vision", "math"},
     "eyes": {"eyes", "math"},
@@ -34,6 +35,7 @@ FOLDERS: dict[str, set[str]] = {
         "process",
         "state",
         "record",
+        "limits",
         "math",
     },
     "absent": {"supervise", "known_map"},
@@ -57,6 +59,7 @@ FILTER_HEADERS = PART_HEADERS | {"state.h", "filter.h", "pelorus.h"}
 HEADERS: dict[str, set[str]] = {
     "math": {"assertions.h", "config.h"},
     "record": FILTER_HEADERS | {"wire.h"},
+    "limits": {"limits.def", "supervisor.h"},
     "state": PART_HEADERS,
     "process": PART_HEADERS,
     "sensor": PART_HEADERS,
@@ -64,7 +67,6 @@ HEADERS: dict[str, set[str]] = {
     "supervise": {
         "assertions.h",
         "config.h",
-        "limits.def",
         "settings.h",
         "supervisor.h",
         "types.h",

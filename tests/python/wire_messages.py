@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pelorus import frames, image
-from pelorus.frames import Message
+from pelorus.wire import frames, image
+from pelorus.wire.frames import Message
 
 EXTREMES = np.array(
     [np.nan, np.inf, -np.inf, 1.7976931348623157e308, -2.2e-308, 5e-324, -0.0, 0.0, 0.1, -1e17]

@@ -33,7 +33,7 @@ sys.path.insert(0, str(ROOT / "tests/python"))
 import robots  # noqa: E402 - what the tests drive
 import verdicts  # noqa: E402
 from pelorus.check.verdict import VERDICTS  # noqa: E402
-from pelorus.cli import main as pelorus  # noqa: E402
+from pelorus.commands.cli import main as pelorus  # noqa: E402
 from pelorus.converters.streams import converted  # noqa: E402
 
 SAID = re.compile(f"^(?:{'|'.join(VERDICTS.values())})(?:, to [0-9.]+% of the way)?$", re.MULTILINE)
@@ -77,10 +77,12 @@ def _grade(words: str) -> str:
 
 
 def printed(*words: str) -> str:
-    """Returns what a command prints."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
-        pelorus(list(words))
+    """Returns what a command prints; one that fails ends the program, with its own words."""
+    out, complaints = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(complaints):
+        status = pelorus(list(words))
+    if status != 0:
+        raise SystemExit(f"pelorus {' '.join(words)} ended with {status}:\n{complaints.getvalue()}")
     return out.getvalue()
 
 

@@ -225,6 +225,73 @@ static void test_a_measured_velocity_has_to_wait_for_the_start(void) {
     TEST_ASSERT_EQUAL_UINT32(1, f->totals.readings_refused);
 }
 
+/* ---------------------------------------------------------------- none is taken any more */
+
+static double position_sigma(void) {
+    double P[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
+    return sqrt(P[0] + P[7] + P[14]);
+}
+
+static double orientation_sigma(void) {
+    double P[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
+    return sqrt(P[21] + P[28] + P[35]);
+}
+
+static double error_m(const plr_pose *told) {
+    double true_pose[16], v[3], sum = 0;
+    imu_flight_truth(&imu_rig.flight, true_pose, v);
+    for (unsigned i = 0; i < 3; i++) {
+        const double off = told->p[i] - true_pose[4 * i + 3];
+        sum += off * off;
+    }
+    return sqrt(sum);
+}
+
+/* The body flies on for so long, and no reading is taken: their clock has started again, so that it ascends, but
+ * from 0. */
+static void fly_refused(double seconds) {
+    const unsigned count = (unsigned)(seconds * 400);
+    for (unsigned k = 0; k < count; k++) {
+        imu_flight_move(&imu_rig.flight);
+        const plr_imu imu = imu_flight_read(&imu_rig.flight);
+        TEST_ASSERT_EQUAL_INT(PLR_E_TIME, plr_filter_inertial(f, 1000 + k, &imu));
+    }
+}
+
+static void test_a_filter_whose_readings_are_refused_grows_with_the_way_that_the_body_goes(void) {
+    static const double seconds[] = {2.5, 6, 20};
+    for (unsigned i = 0; i < 3; i++) {
+        imu_rig_begin(IMU_RIG_GIVEN, 11 + i);
+        imu_rig_fly(10);
+        const double before = position_sigma();
+        const plr_pose told = pose_of(f);
+        fly_refused(seconds[i]);
+        TEST_ASSERT_TRUE(position_sigma() > 5 * before);
+        TEST_ASSERT_TRUE(error_m(&told) < 3 * position_sigma());
+        TEST_ASSERT_TRUE(health_now().reasons & PLR_REASON_NO_TWISTS);
+        TEST_ASSERT_TRUE(specimen_gives_finite_numbers(f));
+    }
+    fly_refused(120); /* and not beyond all bounds */
+    TEST_ASSERT_TRUE(position_sigma() <= 1.01 * sqrt(3.0) * 1000);
+    TEST_ASSERT_TRUE(orientation_sigma() <= 1.01 * sqrt(3.0) * 1.8138);
+}
+
+static void test_readings_that_are_doubled_or_late_for_less_than_max_gap_open_nothing(void) {
+    imu_rig_begin(IMU_RIG_GIVEN, 5);
+    imu_rig_fly(10);
+    for (unsigned k = 0; k < 2000; k++) { /* each comes twice, in time */
+        const plr_imu imu = imu_rig_read();
+        TEST_ASSERT_EQUAL_INT(PLR_E_TIME, plr_filter_inertial(f, imu_rig.flight.t_ns, &imu));
+        if (k % IMU_RIG_EVERY == 0)
+            imu_rig_frame();
+    }
+    imu_rig_remember();
+    fly_refused(0.9 * imu_rig.config.max_gap_s);
+    TEST_ASSERT_TRUE(specimen_same_state(&imu_rig.before, f));
+}
+
 /* ---------------------------------------------------------------- set_velocity */
 
 /* A new filter, with a pose or without one. */

@@ -227,10 +227,72 @@ static void test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was(v
     }
     desk_run();
     const inertial_result after = inertial_read();
-    TEST_ASSERT_EQUAL_UINT8(PLR_ANCHORED, session.filter.source.inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(PLR_IMU_SETTLED, session.filter.source.inertial.phase);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P_now));
     for (int i = 0; i < 3; i++) /* how far it went during the jump, no picture has told */
         TEST_ASSERT_TRUE(P_now[7 * i] > 0.9 * P_then[7 * i]);
     TEST_ASSERT_EQUAL_UINT16(before.pose.reset_count + 1, after.pose.reset_count);
     TEST_ASSERT_TRUE(session.last.used > 3);
+}
+
+/* --- readings that nothing can be done with are told --- */
+
+/* From frame 15 on the IMU's clock has started again, by so many ns; the camera's goes on. */
+static void send_with_an_imu_that_starts_again(unsigned batch, plr_time_ns back_ns) {
+    const plr_time_ns later_ns = back_ns + UINT64_C(5000000000);
+    desk_begin();
+    desk_send(inertial_header());
+    plr_message start = drive_start(0);
+    start.as.start.t_ns += later_ns;
+    desk_send(start);
+    for (int n = 0; n <= INERTIAL_PER_FRAME * (INERTIAL_FRAMES - 1); n++) {
+        plr_message imu = drive_imu(INERTIAL_READING_S * n, batch, INERTIAL_READING_S);
+        imu.as.imu.t_ns += later_ns - (n > 15 * INERTIAL_PER_FRAME ? back_ns : 0);
+        if (n % (int)batch == 0)
+            desk_send(imu);
+        if (n % INERTIAL_PER_FRAME > 0)
+            continue;
+        plr_message frame = drive_stereo(INERTIAL_READING_S * n);
+        frame.as.stereo.t_ns += later_ns;
+        desk_send(frame);
+    }
+    desk_run();
+}
+
+static void test_an_imu_whose_clock_alone_starts_again_is_told_with_the_counter(void) {
+    static const struct {
+        plr_time_ns back_ns;
+        const char *said;
+        bool named;
+    } tried[] = {{UINT64_C(1000) << 32, "32-bit microseconds that wrap", true},
+                 {UINT64_C(1) << 32, "32-bit nanoseconds that wrap", true},
+                 {UINT64_C(600000000000), "that wrap", false}};
+    for (unsigned i = 0; i < 3; i++) {
+        desk_clear(1);
+        send_with_an_imu_that_starts_again(5, tried[i].back_ns);
+        TEST_ASSERT_EQUAL_UINT(1, desk_texts_with("IMU readings are of another clock"));
+        TEST_ASSERT_EQUAL_UINT(tried[i].named, desk_texts_with(tried[i].said));
+        TEST_ASSERT_EQUAL_UINT32(0, session.totals.reanchored);
+        desk_clear(1);
+        send_with_an_imu_that_starts_again(1, tried[i].back_ns); /* three before a frame comes */
+        TEST_ASSERT_TRUE(session.totals.reanchored > 0);
+        TEST_ASSERT_EQUAL_INT(tried[i].named, desk_texts_with(tried[i].said) > 0);
+    }
+}
+
+static void test_readings_that_share_a_stamp_are_told_once_and_doubled_ones_are_not(void) {
+    for (unsigned copies = 2; copies <= 8; copies += 3) {
+        desk_clear(1);
+        desk_begin();
+        desk_send(inertial_header());
+        desk_send(drive_start(0));
+        for (int n = 0; n <= 5 * INERTIAL_PER_FRAME; n++) {
+            for (unsigned c = 0; c < copies; c++)
+                desk_send(drive_imu(INERTIAL_READING_S * n, 1, INERTIAL_READING_S));
+            if (n % INERTIAL_PER_FRAME == 0)
+                inertial_send_frame(&inertial_plain, n / INERTIAL_PER_FRAME);
+        }
+        desk_run();
+        TEST_ASSERT_EQUAL_UINT(copies > 2, desk_texts_with("share a stamp"));
+    }
 }

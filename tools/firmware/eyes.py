@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 from pelorus.errors import PelorusError
-from pelorus.frames import Pose, Stereo
 from pelorus.robot.emulator import Emulator
-from pelorus.wire import messages_of
+from pelorus.wire.frames import Pose, Stereo
+from pelorus.wire.framing import messages_of
 
 from firmware.sizes import BENCH_S, EMULATED_HZ, INSTRUCTIONS_PER_SECOND, fields
 

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pelorus.frames import BodyAxes, Camera, Header, Process, Start, StartFlag
-from pelorus.image import PicturesOf, RigMessage, TimedPair
-from pelorus.inertial import Inertial
-from pelorus.recording import Recording
-from pelorus.tracks import Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math.inertial import Inertial
+from pelorus.wire.frames import BodyAxes, Camera, Header, Process, Start, StartFlag
+from pelorus.wire.image import PicturesOf, RigMessage, TimedPair
 
 PAIRS, PAIR_NS, READING_NS, T0_NS = 12, 50_000_000, 5_000_000, 1_000_000_000
 DEPTH_M, BASELINE_M, SPEED_MPS, G = 2.5, 0.1, 0.8, 9.81

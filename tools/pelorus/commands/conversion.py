@@ -8,10 +8,10 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from pelorus.console import out
 from pelorus.faults.finding import Finding
-from pelorus.frames import TEXT_BYTES_MAX, Text
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.program.console import out
+from pelorus.wire.frames import TEXT_BYTES_MAX, Text
 
 
 def _verdict(finding: Finding) -> str:

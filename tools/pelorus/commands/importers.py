@@ -17,7 +17,6 @@ from rich.markup import escape
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
-from pelorus.console import out
 from pelorus.converters import bag, csv, euroc, kitti, ros, streams, with_pictures
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
@@ -26,8 +25,9 @@ from pelorus.converters.ros_motion import MotionTopics, Wheels
 from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
-from pelorus.frames import TwistTiming
+from pelorus.program.console import out
 from pelorus.rig.lens import LensModel
+from pelorus.wire.frames import TwistTiming
 
 OWN_DATA = "Your own data"
 RADIUS_MAX_M = 5.0

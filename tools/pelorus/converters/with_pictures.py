@@ -11,15 +11,16 @@ import numpy as np
 from pelorus.converters import streams
 from pelorus.converters.streams import Pictures, RawTracks, Streams
 from pelorus.errors import PelorusError
-from pelorus.eyes import COEFFICIENTS_MAX, MODELS, Tracker
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Camera, Header
-from pelorus.image import PicturesOf, RigMessage, TimedPair
-from pelorus.recording import Recording
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
 from pelorus.rig.lens import Lens
 from pelorus.rig.rig import Rig
+from pelorus.tracker import COEFFICIENTS_MAX, MODELS, Tracker
 from pelorus.tracking import images
-from pelorus.tracks import Tracks
+from pelorus.wire.frames import Camera, Header
+from pelorus.wire.image import PicturesOf, RigMessage, TimedPair
+from pelorus.wire.layout import Floats
 
 
 def recording(found: Streams) -> Recording:
@@ -49,9 +50,11 @@ def recording(found: Streams) -> Recording:
     of_tracks = replace(found, frames=RawTracks(frames.where[0], t_ns[:0], none))
     truth = None
     if found.truth is not None:
-        truth = streams._at_frames(found.truth, t_ns, found.motion)
-    made = streams._with_motion(header, of_tracks, t_ns, none)
-    made = replace(made, frame_t_ns=t_ns[:0], pictures=PicturesOf(t_ns, width, height, pairs, message))
+        truth = streams.at_frames(found.truth, t_ns, found.motion)
+    made = streams.with_motion(header, of_tracks, t_ns, none)
+    made = replace(
+        made, frame_t_ns=t_ns[:0], pictures=PicturesOf(t_ns, width, height, pairs, message)
+    )
     return made if truth is None else made.with_truth(truth.t_ns, truth.poses)
 
 
@@ -75,5 +78,5 @@ def _cameras(rig: Rig, header: Header) -> tuple[RigMessage, Header]:
     return message, replace(header, camera=camera, R_CB=R, t_CB_m=t)
 
 
-def _numbers(lens: Lens) -> np.ndarray:
+def _numbers(lens: Lens) -> Floats:
     return np.array((*lens.coefficients, *([0.0] * COEFFICIENTS_MAX))[:COEFFICIENTS_MAX])
