@@ -54,7 +54,7 @@ def recording(width: int, height: int, tracks: int, landmarks: int) -> Recording
 
     own = T0_NS + READING_NS * np.arange(PAIRS * PAIR_NS // READING_NS)
     chance = np.random.default_rng(5)
-    force = [0, 0, G] + chance.normal(scale=0.02, size=(len(own), 3))
+    force = np.array([0, 0, G]) + chance.normal(scale=0.02, size=(len(own), 3))
     turn = chance.normal(scale=1e-3, size=(len(own), 3))
     lens = (f, f, cx, cy)
     rig = RigMessage(
@@ -75,7 +75,10 @@ def recording(width: int, height: int, tracks: int, landmarks: int) -> Recording
         header, nothing, np.empty((0, 3)), np.empty((0, 3)), nothing, none, start=start,
         inertial=Inertial(own, force, turn),
         # a board has no room for the clock's column, and the desk is to do without it, too
-        settings={"slots": landmarks, "imu-start": 3.0, "pixel-sigma": 0.5, "camera-clock-sigma": 0},
+        settings={
+            **{"slots": landmarks, "imu-start": 3.0},
+            **{"pixel-sigma": 0.5, "camera-clock-sigma": 0},
+        },
         pictures=PicturesOf(t_ns, width, height, pairs, rig),
     )  # fmt: skip
 

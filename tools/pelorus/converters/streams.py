@@ -216,6 +216,7 @@ def converted(
 
 
 def with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
+    """Returns a recording of the tracks with the streams' twists or IMU, and their remarks."""
     remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.all_remarks]
     motion = streams.motion
     if isinstance(motion, Twists):
