@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from firmware import pictures
 from pelorus import Tracker
+from pelorus.math.se3 import Poses
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.math.se3 import Poses
 from pelorus.tracker import MODELS
 from pelorus.wire import framing
 from pelorus.wire.frames import Config, Header, Message, Process, Stereo, Twist

@@ -116,8 +116,8 @@ def main() -> int:
         print(f"{pair.t_ns * 1e-9:9.3f}{look * 1e-6:14.2f}{update * 1e-6:9.2f}   {same}")
     later = found.look[1:]
     print(
-        f"eyes: {np.mean(later) * 1e-6:.2f} million instructions a pair, {max(later) * 1e-6:.2f} at "
-        f"most, {found.look[0] * 1e-6:.2f} the first, all births; {found.eyes_bytes} bytes of eyes "
+        f"eyes: {np.mean(later) * 1e-6:.2f} million instructions a pair, "
+        f"{max(later) * 1e-6:.2f} at most, {found.look[0] * 1e-6:.2f} the first, all births; {found.eyes_bytes} bytes of eyes "
         f"and {found.session_bytes} of session; stack {found.stack} bytes"
     )
     return 0 if found.pairs == desk else 1

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Makes a recording with pictures that a board's image can carry: a camera with an IMU passes a wall.
+"""Makes recordings with pictures that images can carry: a camera with an IMU passes a wall.
 
 usage: python -m firmware.pictures FOLDER
 
-One for each board that has images with eyes, FOLDER/BOARD.plr, of the sizes in port/cortex_m/cmake/Boards.cmake.
+One for each board that has images with eyes, FOLDER/BOARD.plr, of the sizes in
+port/cortex_m/cmake/Boards.cmake.
 """
 
 from __future__ import annotations
