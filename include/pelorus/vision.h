@@ -107,7 +107,9 @@ typedef struct plr_vision_report {
     bool
         swapped; /* points are found where the other side should be: left and right are exchanged */
     uint16_t followed; /* tracks that were found again in the left picture */
-    uint16_t observed; /* and in the right one: these, and the born, are handed out */
+    uint16_t
+        observed; /* and in the right one: these, and the born, are handed out, but for those whose rows
+                          differ by half a pixel more or less than the pair's median */
     uint16_t born;
     uint16_t corners;  /* tried as births */
     uint16_t cut_anew; /* patches that had become too different from those of their births */

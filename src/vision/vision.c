@@ -18,6 +18,8 @@ enum {
 };
 
 #define CROWDED_PX PLR_R(3)
+/* Of a row gap beside the pair's median: twice what real pictures show, 0.2 to 0.3 px. */
+#define STRAY_PX 0.5F
 
 /* --- life --- */
 
@@ -244,6 +246,39 @@ static plr_real sigma_of(const plr_vision *v, const plr_track *t) {
     return scale * PLR_SQRT(var);
 }
 
+/* By how much the observation's right row is lower, px. */
+static float row_gap(const plr_observation *o) {
+    return o->vR_px - o->vL_px;
+}
+
+/* The median of the n observations' row gaps. */
+static float usual_row_gap(const plr_observation *o, unsigned n) {
+    float sorted[PLR_VISION_TRACKS];
+    for (unsigned i = 0; i < n; i++) {
+        const float gap = row_gap(&o[i]);
+        unsigned j = i;
+        for (; j > 0 && sorted[j - 1] > gap; j--)
+            sorted[j] = sorted[j - 1];
+        sorted[j] = gap;
+    }
+    return n > 0 ? sorted[n / 2] : 0.0F;
+}
+
+/* Whose rows differ otherwise than those of the pair's others has been matched wrong, along the line as
+ * well as across it. The others tell what calibration and timing do to all. Returns how many stay. */
+static unsigned leave_out_strays(plr_vision *v, unsigned n) {
+    const float usual = usual_row_gap(v->observations, n);
+    unsigned kept = 0;
+    for (unsigned i = 0; i < n; i++) {
+        const float off = row_gap(&v->observations[i]) - usual;
+        if (!(off < STRAY_PX && off > -STRAY_PX))
+            continue;
+        v->observations[kept] = v->observations[i];
+        v->sights[kept++] = v->sights[i];
+    }
+    return kept;
+}
+
 static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
     unsigned n = 0;
     for (unsigned i = 0; i < v->track_count; i++) {
@@ -261,7 +296,7 @@ static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
         v->observations[n] = o;
         v->sights[n++] = sight;
     }
-    frame->count = (uint16_t)n;
+    frame->count = (uint16_t)leave_out_strays(v, n);
 }
 
 /* The two pictures, or one of them, cannot be used: true. */
