@@ -151,6 +151,14 @@ build_replays() {
         cmake --build --preset "$preset" -j "$JOBS" --target pelorus-replay pelorus-replay-f64)
 }
 
+# emulated_ccm: where the emulated stm32f405 has its second memory. QEMU before 8.0 has 192 KB in one piece.
+emulated_ccm() {
+    case $(qemu-system-arm --version 2>/dev/null | grep -oE '[0-9]+' | head -1) in
+    [1-7]) echo 0x20020000 ;;
+    *) echo 0x10000000 ;;
+    esac
+}
+
 # build_robot TARGET...: firmware, in build/robot. Images of every one of $CAPACITIES, and the bench images
 # that docs/SIZES.md is measured on (target bench), come out of one build: each library is compiled once.
 ROBOT=$ROOT/build/robot
@@ -161,6 +169,13 @@ build_robot() {
     case " $* " in *' bench '*)
         PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes recordings "$ROBOT" || return 1
         options=("-DPELORUS_CAPACITIES=${CAPACITIES// /;}" "-DPELORUS_BENCH_RECORDINGS=$ROBOT/twist.plr;$ROBOT/imu.plr")
+        ;;
+    esac
+    case " $* " in *' eyes-replay-'*)
+        mkdir -p "$ROBOT/pictures"
+        PELORUS_BIN=$ROOT/build/bin PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.pictures \
+            "$ROBOT/pictures" || return 1
+        options+=("-DPELORUS_EYES_RECORDINGS=$ROBOT/pictures" "-DPELORUS_CCM_ORIGIN=$(emulated_ccm)")
         ;;
     esac
     cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" -DCMAKE_BUILD_TYPE=None \

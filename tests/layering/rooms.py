@@ -34,7 +34,7 @@ ROOMS: dict[str, str] = {
     "simulate": "errors program wire math io",
     "robot": "errors wire",
     "faults": "program wire math io evaluate tracking",
-    "converters": "errors program wire math io evaluate tracking rig faults",
+    "converters": "errors program wire math io evaluate tracking rig tracker faults",
     "online": "errors wire math io evaluate tracking rig native filter faults converters",
     "live": "errors program wire math io evaluate tracking rig native robot converters online",
     "check": "errors program wire math io evaluate tracking native faults converters",

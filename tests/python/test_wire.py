@@ -44,6 +44,7 @@ from pelorus.wire.frames import (
     Twist,
 )
 from pelorus.wire.framing import KINDS, Counts, Reader, Received, VersionError, Writer
+from pelorus.wire.image import RigMessage, Side, TimedPair, bands_of, pairs_of
 from pelorus.wire.layout import MalformedPayload, row_type
 from pelorus.wire.schema import SENSORS
 
@@ -78,6 +79,28 @@ MESSAGES: list[Message] = [
     End(1, 2, 3, 4, 5, 6, 63, (7, 8, 9, 10, 11), 12, 13),
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
     Reading(10, SENSORS["wheel"], 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
+    *bands_of(13, Side.RIGHT, np.arange(600, dtype=np.uint16).astype(np.uint8).reshape(20, 30)),
+    RigMessage(
+        752,
+        480,
+        1,
+        458.5,
+        457.5,
+        367.5,
+        248.5,
+        2,
+        457.5,
+        456.5,
+        379.5,
+        255.5,
+        CHANCE.normal(size=8),
+        CHANCE.normal(size=8),
+        R,
+        CHANCE.normal(size=3),
+        2e-5,
+        120,
+        60,
+    ),
     Imu(11, CHANCE.normal(size=(1, 3)), CHANCE.normal(size=(1, 3))),
     Imu(11, CHANCE.normal(size=(20, 3)), CHANCE.normal(size=(20, 3)), 2_500_000),
     Calibrated(12, 5, Camera(1.5, 2.5, 3.5, 4.5, 0.1), R, np.ones(3), np.arange(11.0), np.ones(11)),
@@ -99,6 +122,8 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.READING: [58],
     Kind.IMU: [13 + 24 * n for n in (1, 20)],
     Kind.CALIBRATION: [250],
+    Kind.IMAGE: [19 + n for n in (568, 32)],
+    Kind.RIG: [306],
 }
 
 
@@ -164,7 +189,7 @@ def test_a_frame_is_these_bytes() -> None:
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 8, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 9, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:211] == "Straße 7".encode()
     assert np.array_equal(np.frombuffer(header, "<f8", 6, 211), np.full(6, -1.0))
     assert header[259] == Process.TWIST
@@ -435,3 +460,32 @@ def test_twenty_megabytes_take_seconds() -> None:
     assert time.process_time() - began < 10
     assert len(received) == count
     assert counts.clean
+
+
+def picture(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, (60, 80), dtype=np.uint8)
+
+
+def test_pictures_come_back_from_their_bands() -> None:
+    both = [
+        *bands_of(5, Side.LEFT, picture(1)),
+        *bands_of(6, Side.RIGHT, picture(2)),
+        *bands_of(9, Side.RIGHT, picture(4)),
+        *bands_of(9, Side.LEFT, picture(3)),
+    ]
+    received, counts = read(stream_of(both))
+    assert counts.clean
+    first, second = pairs_of(frame.message for frame in received)
+    assert (first.t_ns, first.t_right_ns, second.t_ns) == (5, 6, 9)
+    assert (first.left == picture(1)).all()
+    assert (first.right == picture(2)).all()
+    assert (second.left == picture(3)).all()
+
+
+def test_a_picture_with_a_missing_or_a_disordered_band_is_left_out() -> None:
+    bands = list(bands_of(5, Side.LEFT, picture(1)))
+    whole = list(bands_of(5, Side.RIGHT, picture(2)))
+    assert not list(pairs_of([*bands[:3], *bands[4:], *whole]))
+    assert not list(pairs_of([bands[1], bands[0], *bands[2:], *whole]))
+    again: list[TimedPair] = list(pairs_of([*bands[:3], *bands, *whole]))
+    assert len(again) == 1

@@ -97,9 +97,9 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
         image_width_px=rig.left.width_px, image_height_px=rig.left.height_px,
     )  # fmt: skip
     of_tracks = replace(found, frames=streams.RawTracks(Path(), t_ns, tracks))
-    made = streams._with_motion(header, of_tracks, t_ns, tracks)
+    made = streams.with_motion(header, of_tracks, t_ns, tracks)
     assert found.truth is not None
-    truth = streams._at_frames(found.truth, t_ns, found.motion)
+    truth = streams.at_frames(found.truth, t_ns, found.motion)
     lengths = np.bincount(id)
     return made.with_truth(truth.t_ns, truth.poses), float(lengths[lengths > 0].mean())
 

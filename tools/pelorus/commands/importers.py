@@ -17,7 +17,7 @@ from rich.markup import escape
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
-from pelorus.converters import bag, csv, euroc, kitti, ros, streams
+from pelorus.converters import bag, csv, euroc, kitti, ros, streams, with_pictures
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
@@ -48,6 +48,7 @@ SHARED: dict[str, tuple[Any, Any]] = {
     "twist_in": (TwistIn, own.TWIST_IN),
     "twist_timing": (Timing | None, own.TIMING),
     "fix": (Fix, own.FIX),
+    "keep_pictures": (bool, own.KEEP_PICTURES),
 }
 
 
@@ -104,6 +105,7 @@ def _asked(
     twist_in: TwistIn,
     twist_timing: Timing | None,
     fix: Fix,
+    keep_pictures: bool,
 ) -> Asked:
     named = Columns.of(columns, crs, rows)
     timing = None if twist_timing is None else twist_timing.value_in_header
@@ -128,6 +130,7 @@ def _asked(
         timing,
         fix is Fix.AUTO,
         tuple(named.remarks),
+        keep_pictures,
     )
 
 
@@ -306,6 +309,12 @@ def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> W
 def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
     whole = replace(found, remarks=[*asked.remarks, *found.remarks])
     timing = usual if asked.timing is None else asked.timing
+    if asked.keep_pictures:
+        for remark in whole.all_remarks:
+            out.print(escape(remark))
+        made = with_pictures.recording(whole)
+        write(made if timing is None else made.with_header(twist_timing=timing), [], target)
+        return
     converted(whole, timing, asked.fix, target)
 
 

@@ -103,6 +103,7 @@ class Asked:
     timing: TwistTiming | None = None
     fix: bool = True
     remarks: tuple[str, ...] = ()
+    keep_pictures: bool = False
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
     if calibrated.rig is not None:
         t_ns = calibrated.rig.on_body_clock(t_ns)
     _require_overlap(frames, t_ns, streams.motion)
-    truth = None if streams.truth is None else _at_frames(streams.truth, t_ns, streams.motion)
+    truth = None if streams.truth is None else at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
         repeats = repeated.Repeats(_moves(streams.motion, t_ns), t_ns)
         header, tracks = _tracked(frames, calibrated, settings or Settings(), repeats)
@@ -174,7 +175,7 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
             tracks = _rectified(tracks, rectification, frames.where)
         moves = _moves(streams.motion, t_ns)
         t_ns, tracks, found = repeated.left_out(moves, t_ns, tracks, header.camera)
-    made = _with_motion(header, streams, t_ns, tracks)
+    made = with_motion(header, streams, t_ns, tracks)
     if isinstance(streams.motion, Readings):
         made, more = full_scale.with_ranges(made, streams.motion.inertial)
         found = [*found, *more]
@@ -214,7 +215,8 @@ def converted(
 # --- motion ---------------------------------------------------------------------------------------
 
 
-def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
+def with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
+    """Returns a recording of the tracks with the streams' twists or IMU, and their remarks."""
     remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.all_remarks]
     motion = streams.motion
     if isinstance(motion, Twists):
@@ -451,7 +453,7 @@ def _tracked(
 # --- truth ----------------------------------------------------------------------------------------
 
 
-def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -> Trajectory:
+def at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -> Trajectory:
     """Returns the truth while the sensors run, with a pose at each frame and where the motion
     begins.
 

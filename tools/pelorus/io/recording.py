@@ -32,6 +32,7 @@ from pelorus.wire.frames import (
     Twist,
 )
 from pelorus.wire.framing import write_file
+from pelorus.wire.image import PicturesOf
 from pelorus.wire.layout import Floats
 from pelorus.wire.settings import IDS
 
@@ -63,6 +64,7 @@ class Recording:
     imu_batch: int = IMU_READINGS_MAX  # readings of a message, at most
     start: Start | None = None
     settings: dict[str, float] = field(default_factory=dict)  # wanted; options win over them
+    pictures: PicturesOf | None = None  # in place of tracks
 
     def with_header(self, **changes: Any) -> Recording:
         return replace(self, header=replace(self.header, **changes))
@@ -104,6 +106,8 @@ class Recording:
     def messages(self) -> Iterator[Message]:
         """Yields the messages in the order of docs/REPLAY-FORMAT.md."""
         yield self.header
+        if self.pictures is not None and self.pictures.rig is not None:
+            yield self.pictures.rig
         if self.settings:
             yield Config({IDS[name]: value for name, value in self.settings.items()})
         yield from self.remarks
@@ -111,12 +115,14 @@ class Recording:
         if self.start is not None:
             yield self.start
         streams = (self._twists(), self._imu(), self._small(), self._truths(), self._stereos())
+        streams = (*streams, self._images())
         for _, _, message in heapq.merge(*streams, key=lambda entry: entry[:2]):
             yield message
 
     def __len__(self) -> int:
         data = len(self.twist_t_ns) + len(self.truth_t_ns) + len(self.frame_t_ns)
         data += len(self.inertial.t_ns) // self.imu_batch
+        data += 0 if self.pictures is None else len(self.pictures)
         return (
             1
             + bool(self.settings)
@@ -134,6 +140,8 @@ class Recording:
         """Yields the IMU's messages, each at the time of its last reading."""
         small = np.array([reading.t_ns for reading in self.readings], np.int64)
         cuts = np.union1d(self.frame_t_ns, small)
+        if self.pictures is not None:
+            cuts = np.union1d(cuts, self.pictures.t_ns)
         for t, message in inertial.messages(self.inertial, cuts, self.imu_batch):
             yield t + self.twist_delay_ns, 0, message
 
@@ -165,6 +173,11 @@ class Recording:
             sigma = None if sigmas is None else sigmas[rows]
             message = Stereo(t, ids[rows], pixels[rows], sigmas=sigma)
             yield t + self.camera_delay_ns, 3, message
+
+    def _images(self) -> Iterator[tuple[int, int, Message]]:
+        if self.pictures is not None:
+            for t, band in self.pictures.messages():
+                yield t + self.camera_delay_ns, 4, band
 
     def write(self, path: Path) -> int:
         """Writes the whole file; returns its size in bytes. Nothing remains if that fails."""

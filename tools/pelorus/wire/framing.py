@@ -18,7 +18,7 @@ from typing import BinaryIO, NamedTuple
 
 from pelorus.errors import PelorusError, whole, writing
 from pelorus.program.console import progress
-from pelorus.wire import calibrated, cobs, evidence, packed_file, schema
+from pelorus.wire import calibrated, cobs, evidence, image, packed_file, schema
 from pelorus.wire.frames import End, Header, Kind, Message
 from pelorus.wire.layout import MalformedPayload
 
@@ -29,7 +29,7 @@ STUFFED_BYTES_MAX = 1 << 20  # ten times this version's longest frame; limits th
 HOPELESS_BYTES = 1 << 20  # after so many bytes without a good frame no more will come
 SEQUENCE_MODULUS = 1 << 16
 KINDS: dict[int, type[Message]] = {cls.kind: cls for cls in Message.__subclasses__()}
-assert {evidence.Evidence, calibrated.Calibrated} <= set(KINDS.values())
+assert {evidence.Evidence, calibrated.Calibrated, image.Image} <= set(KINDS.values())
 FAULTS_KEPT = 100  # the first ones are remembered with their place, all are counted
 
 

@@ -37,10 +37,12 @@ class Kind(IntEnum):
     IMU = schema.kind("IMU")
     EVIDENCE = schema.kind("EVIDENCE")
     CALIBRATION = schema.kind("CALIBRATION")
+    IMAGE = schema.kind("IMAGE")
+    RIG = schema.kind("RIG")
 
 
 # Data with a time, after the messages that say how to read them.
-DATA_KINDS = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.READING)
+DATA_KINDS = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.READING, Kind.IMAGE)
 # Kinds of which a log has many: DATA_KINDS and their answers.
 MANY = (*DATA_KINDS, Kind.LANDMARK, Kind.POSE, Kind.REPORT, Kind.EVIDENCE)
 
