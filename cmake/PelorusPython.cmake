@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# The library as Python loads it (tools/pelorus/native.py), in each precision: pelorus-filter.so, .dll or .dylib
+# The library as Python loads it (tools/pelorus/native/binding.py), in each precision: pelorus-filter.so, .dll or .dylib
 # beside pelorus-replay. With PELORUS_PYTHON, as pip builds it (pyproject.toml), these four are installed into
 # the package.
 

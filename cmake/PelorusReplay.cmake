@@ -14,6 +14,12 @@ else()
   set(PELORUS_ZSTD_LIBRARY "")
 endif()
 
+if(PLR_VISION)
+  list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/pictures_none\\.c$")
+else()
+  list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/pictures\\.c$")
+endif()
+
 if(WIN32)
   list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/system_posix\\.c$")
 else()

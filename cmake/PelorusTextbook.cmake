@@ -38,7 +38,8 @@ endif()
 file(GLOB pelorus_textbook_session CONFIGURE_DEPENDS
   "${PROJECT_SOURCE_DIR}/src/session/*.c" "${PROJECT_SOURCE_DIR}/src/record/*.c")
 set(pelorus_textbook_posix ${PELORUS_POSIX_SOURCES})
-list(FILTER pelorus_textbook_posix EXCLUDE REGEX "/(main|program)\\.c$")
+list(FILTER pelorus_textbook_posix EXCLUDE REGEX "/(main|program|pictures|pictures_none)\\.c$")
+list(APPEND pelorus_textbook_posix "${PROJECT_SOURCE_DIR}/port/posix/pictures_none.c")
 add_executable(pelorus-textbook
   "${pelorus_textbook_dir}/main.c"
   "${pelorus_textbook_dir}/program.c"

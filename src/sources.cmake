@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # The library's sources, for every build: it stands beside them, so that src, include and a port are all that a
 # build on another system has to take. A room that is left out is replaced by the file of its name in absent;
-# nothing inside the library calls vision, so nothing stands in for it.
+# nothing inside the library calls vision or eyes, so nothing stands in for them.
 function(pelorus_sources result)
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/*/*.c")
   foreach(room supervise known_map)
@@ -13,7 +13,7 @@ function(pelorus_sources result)
     endif()
   endforeach()
   if(DEFINED PLR_VISION AND NOT PLR_VISION)
-    list(FILTER sources EXCLUDE REGEX "/src/vision/")
+    list(FILTER sources EXCLUDE REGEX "/src/(vision|eyes)/")
   endif()
   set(${result} "${sources}" PARENT_SCOPE)
 endfunction()

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: MIT
 """Builds pelorus-replay for other systems, runs what this machine can run, and compares the bits.
 
-usage: cross.py [--out FOLDER] [SYSTEM...]
+usage: cross.py [--out FOLDER] [--compile-only] [SYSTEM...]
 
 The compiler is the one of the package ziglang. It is given the library as one file (amalgamate.py)
 and the replay as another. Each program that can be run here, by qemu-user, by the package wasmtime
 or by wine, replays a simulated recording of twists and one of an IMU; the SHA-256 of the
 trajectories must be that of build/bin/pelorus-replay, or of the first target where there is none.
+With --compile-only nothing is linked or run, and no library of a system built, which takes minutes.
 """
 
 from __future__ import annotations
@@ -115,17 +116,34 @@ def port_flags(target: Target, bits: int) -> list[str]:
     return [*WARNINGS, real(bits), f'-DPELORUS_ARCH="{arch}"']
 
 
+def write_replay(target: Target, folder: Path) -> Path:
+    """Writes the program's source, one file, into the folder."""
+    replay = amalgamate.program(ROOT, replay_sources(target))
+    (source := folder / "replay.c").write_text(replay, encoding="utf-8")
+    return source
+
+
+def program_flags(target: Target, bits: int, name: str) -> list[str]:
+    """Returns the options for the program's source."""
+    names = [f'-DPELORUS_NAME="{name}"', "-D_XOPEN_SOURCE=700"]
+    large = ["-D_FILE_OFFSET_BITS=64"] if target.windows else []
+    return [*port_flags(target, bits), *names, *large]
+
+
+def compile_only(target: Target, folder: Path, bits: int = 32) -> None:
+    """Compiles library and program, and links nothing."""
+    build_library(target, folder, bits)
+    flags = [*program_flags(target, bits, "pelorus-replay"), "-c"]
+    compile_to(folder / "replay.o", write_replay(target, folder), target, flags)
+
+
 def build(target: Target, folder: Path, bits: int = 32) -> Path:
     """Builds the program in the folder."""
     library = build_library(target, folder, bits)
-    replay = amalgamate.program(ROOT, replay_sources(target))
-    (folder / "replay.c").write_text(replay, encoding="utf-8")
     program = folder / target.program.replace("replay", "replay-f64" if bits == 64 else "replay")
-    names = [f'-DPELORUS_NAME="{program.stem}"', "-D_XOPEN_SOURCE=700"]
-    large = ["-D_FILE_OFFSET_BITS=64"] if target.windows else []
     objects = [str(library), *([] if target.windows else ["-lm"]), "-s"]
-    flags = [*port_flags(target, bits), *names, *large, *objects]
-    compile_to(program, folder / "replay.c", target, flags)
+    flags = [*program_flags(target, bits, program.stem), *objects]
+    compile_to(program, write_replay(target, folder), target, flags)
     return program
 
 
@@ -198,22 +216,38 @@ def simulate(folder: Path) -> None:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
-def asked_for(what: str, known: Iterable[str], folder: str) -> tuple[Path, list[str]]:
-    """Parses the command line: the folder for the build, and which of the known systems, or all."""
+def asked_for(
+    what: str, known: Iterable[str], folder: str, flags: Sequence[str] = ()
+) -> argparse.Namespace:
+    """Parses the command line: `out`, where to build; `systems`, all where none is named; flags."""
     names = list(known)
     parser = argparse.ArgumentParser(description=what.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / folder, help="where to build")
+    for flag in flags:
+        parser.add_argument(flag, action="store_true")
     parser.add_argument("systems", nargs="*", metavar="SYSTEM", help=", ".join(names))
     given = parser.parse_args()
     if unknown := sorted(set(given.systems) - set(names)):
         parser.error(f"no system {', '.join(unknown)}; there are {', '.join(names)}")
     given.out.mkdir(parents=True, exist_ok=True)
-    return given.out.resolve(), given.systems or names
+    given.out = given.out.resolve()
+    given.systems = given.systems or names
+    return given
 
 
 def main() -> int:
-    """Builds, runs, compares; returns the exit status."""
-    out, names = asked_for(__doc__, TARGETS, "build/cross")
+    """Does what the command line asks for; returns the exit status."""
+    given = asked_for(__doc__, TARGETS, "build/cross", ["--compile-only"])
+    if given.compile_only:
+        for name in given.systems:
+            compile_only(TARGETS[name], given.out / name)
+            print(f"{name:15} compiled", flush=True)
+        return 0
+    return compare(given.out, given.systems)
+
+
+def compare(out: Path, names: Sequence[str]) -> int:
+    """Builds, runs and compares the bits; returns the exit status."""
     differ = 0
     with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:
         folder = Path(temporary)

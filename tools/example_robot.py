@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pelorus.errors import PelorusError, writing
-from pelorus.frames import Camera, TwistTiming
-from pelorus.recording import Recording
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.io.recording import Recording
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Camera, TwistTiming
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 

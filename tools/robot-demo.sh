@@ -5,7 +5,10 @@
 # the bit.
 #
 # usage: tools/robot-demo.sh [BOARD [RECORDING.plr]]
+#        tools/robot-demo.sh --pictures [BOARD]
 #
+# With --pictures the board (stm32f405 or mps2_an500) has eyes, and pictures of a drive in its image: each pair's
+# observations and pose are compared, and instructions are counted.
 # BOARD is stm32f405 (the default), mps2_an386, mps2_an500 or mps3_an547. The flight log is left in
 # out/flight-BOARD.plr, the firmware in build/robot/images.
 set -euo pipefail
@@ -13,13 +16,20 @@ set -euo pipefail
 
 case ${1-} in
 -h | --help)
-    sed -n '3,10s/^# \{0,1\}//p' "$0"
+    sed -n '3,14s/^# \{0,1\}//p' "$0"
     exit 0
     ;;
 esac
+pictures=0
+[ "${1-}" != --pictures ] || { pictures=1 && shift; }
 [ $# -le 2 ] || die "too many arguments: tools/robot-demo.sh [BOARD [RECORDING.plr]]"
 board=${1-stm32f405}
 recording=${2-}
+image=pelorus-$board-n32
+if [ $pictures = 1 ]; then
+    image=eyes-replay-$board
+    grep -q "set(board_${board}_eyes" "$ROOT/port/cortex_m/cmake/Boards.cmake" || die "no eyes for a board $board"
+fi
 [ -d "$ROOT/port/cortex_m/boards/$board" ] ||
     die "no board $board; there are: $(cd "$ROOT/port/cortex_m/boards" && echo */ | tr -d /)"
 [ -z "$recording" ] || [ -r "$recording" ] || die "$recording: cannot be read"
@@ -33,16 +43,22 @@ ensure_python
 heading "Building: firmware for $board, and this machine's replay"
 mkdir -p "$LOGS" "$ROOT/out"
 build() {
-    build_robot "pelorus-$board-n32" &&
-        build_preset release -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=OFF
+    build_preset release -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=OFF &&
+        build_robot "$image"
 }
 if ! build >"$LOGS/robot-demo-build.log" 2>&1; then
     tail -40 "$LOGS/robot-demo-build.log"
     die "the build failed: the whole of it is in $LOGS/robot-demo-build.log"
 fi
-arm-none-eabi-size "$ROBOT/images/pelorus-$board-n32.elf"
+arm-none-eabi-size "$ROBOT/images/$image.elf"
 
 cd "$ROOT"
+if [ $pictures = 1 ]; then
+    heading "Pictures, on the emulated $board and at the desk"
+    PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.eyes "$board" \
+        "$ROBOT/images/eyes-replay-$board.elf" "$ROBOT/pictures/$board.plr" build/bin/pelorus-replay
+    exit
+fi
 if [ -z "$recording" ]; then
     heading 'Simulating a drive'
     recording=$ROOT/out/robot-demo.plr

@@ -106,7 +106,7 @@ ensure_python() {
     local wanted
     python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
         die "Python $(python3 -V 2>&1 | cut -d' ' -f2) is too old: 3.11 or later is needed"
-    wanted="$ROOT $(python3 -V) $(cat "$lock" "$ROOT/pyproject.toml" | sha256sum)"
+    wanted="$ROOT $(python3 -V) $(cat "$lock" "$ROOT/pyproject.toml" "$ROOT/tools/course/pyproject.toml" | sha256sum)"
     if [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then
         echo 'Python environment: up to date'
         return 0
@@ -119,7 +119,7 @@ ensure_python() {
         die 'pip could not install tools/requirements.lock: is there a network?'
     # The sources as they are, without the library: that one comes from build/bin.
     "$VENV/bin/python" -m pip install --quiet --no-deps --no-build-isolation \
-        --config-settings=wheel.cmake=false --config-settings=editable.mode=inplace --editable "$ROOT" ||
+        --config-settings=wheel.cmake=false --config-settings=editable.mode=inplace --editable "$ROOT" --editable "$ROOT/tools/course" ||
         die 'pip could not install the tools'
     printf '%s' "$wanted" >"$stamp"
 }
@@ -151,6 +151,14 @@ build_replays() {
         cmake --build --preset "$preset" -j "$JOBS" --target pelorus-replay pelorus-replay-f64)
 }
 
+# emulated_ccm: where the emulated stm32f405 has its second memory. QEMU before 8.0 has 192 KB in one piece.
+emulated_ccm() {
+    case $(qemu-system-arm --version 2>/dev/null | grep -oE '[0-9]+' | head -1) in
+    [1-7]) echo 0x20020000 ;;
+    *) echo 0x10000000 ;;
+    esac
+}
+
 # build_robot TARGET...: firmware, in build/robot. Images of every one of $CAPACITIES, and the bench images
 # that docs/SIZES.md is measured on (target bench), come out of one build: each library is compiled once.
 ROBOT=$ROOT/build/robot
@@ -161,6 +169,13 @@ build_robot() {
     case " $* " in *' bench '*)
         PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes recordings "$ROBOT" || return 1
         options=("-DPELORUS_CAPACITIES=${CAPACITIES// /;}" "-DPELORUS_BENCH_RECORDINGS=$ROBOT/twist.plr;$ROBOT/imu.plr")
+        ;;
+    esac
+    case " $* " in *' eyes-replay-'*)
+        mkdir -p "$ROBOT/pictures"
+        PELORUS_BIN=$ROOT/build/bin PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.pictures \
+            "$ROBOT/pictures" || return 1
+        options+=("-DPELORUS_EYES_RECORDINGS=$ROBOT/pictures" "-DPELORUS_CCM_ORIGIN=$(emulated_ccm)")
         ;;
     esac
     cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" -DCMAKE_BUILD_TYPE=None \

@@ -36,7 +36,7 @@ WHEELS = {
 
 
 def suffix(target: Target) -> str:
-    """Returns the suffix of a library, as tools/pelorus/native.py looks for it."""
+    """Returns the suffix of a library, as tools/pelorus/native/binding.py looks for it."""
     if target.windows:
         return ".dll"
     return ".dylib" if "macos" in target.triple else ".so"
@@ -111,13 +111,13 @@ def make(tag: str, target: Target, own: Path, work: Path, out: Path) -> Path:
 
 def main() -> int:
     """Builds the wheels; returns the exit status."""
-    out, tags = asked_for(__doc__, WHEELS, "build/wheels")
+    given = asked_for(__doc__, WHEELS, "build/wheels")
     with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:
         folder = Path(temporary)
         own = pip_wheel(folder)
-        for tag in tags:
+        for tag in given.systems:
             (work := folder / tag).mkdir()
-            made = make(tag, WHEELS[tag], own, work, out)
+            made = make(tag, WHEELS[tag], own, work, given.out)
             print(f"{made}: {made.stat().st_size // 1024} KB", flush=True)
     return 0
 

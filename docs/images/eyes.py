@@ -15,7 +15,7 @@ import hero
 import numpy as np
 import street
 from pelorus import Calibration, Tracker
-from pelorus.tracks import Tracks
+from pelorus.io.tracks import Tracks
 
 FRAMES, SHOWN, POINTS = 40, (12, 39), 100
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from pelorus import Calibration, Filter, KnownLandmark, observations
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
-from pelorus.tracks import Tracks
+from pelorus.io.tracks import Tracks
 from PIL import Image
 from scipy.spatial.transform import Rotation
 

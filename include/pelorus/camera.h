@@ -28,9 +28,6 @@ typedef struct plr_camera_estimate {
     plr_real R[9], t[3];               /* the same without the clock's part */
     plr_real twist[PLR_POSE_DIM];      /* of the camera at the last frame, m/s and rad/s */
     plr_real mean_twist[PLR_POSE_DIM]; /* the mean of it over the offset of the camera's clock */
-    plr_real rate[3], rate_variance;   /* of the gyro, smoothed, bias included, rad/s; of an axis */
-    /* Of the process, the last one first: seconds, and the rate, bias included, rad/s. */
-    plr_real step[PLR_CLOCK_STEPS][4];
     uint32_t moves; /* 0: by all that is known the body rests, and nothing is learnt */
     plr_real moved[PLR_CALIBRATIONS];  /* by how much each has been corrected */
     uint8_t misfits[PLR_CALIBRATIONS]; /* frames that would have moved each too far; 10: refused */
@@ -42,6 +39,10 @@ typedef struct plr_camera_estimate {
     plr_real sum[PLR_CALIBRATIONS], sum_variance[PLR_CALIBRATIONS], usual[PLR_CALIBRATIONS];
     plr_real usual_frames; /* from which that was learnt */
     plr_real excess; /* the largest that is usual, 1 or more: what is learnt counts 1/excess */
+    /* From here on readings change it. */
+    plr_real rate[3], rate_variance; /* of the gyro, smoothed, bias included, rad/s; of an axis */
+    /* Of the process, the last one first: seconds, and the rate, bias included, rad/s. */
+    plr_real step[PLR_CLOCK_STEPS][4];
 } plr_camera_estimate;
 
 /* The camera: what init was given, and from `estimate` on what has become of it. Of sigmas the squares. */

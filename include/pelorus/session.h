@@ -12,7 +12,8 @@
  *
  * Messages in (docs/REPLAY-FORMAT.md), in this order: HEADER; CONFIG and known LANDMARKs, as
  * needed; START, or instead of it STATE (restore); then TWIST or IMU, STEREO, TRUTH and READING,
- * and at any time among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a
+ * and at any time among them STATE (save); END. Pictures (IMAGE, RIG)
+ * are for a session with eyes (eyes.h). Messages out: the CONFIG in use; a POSE and a
  * REPORT after each frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END.
  * No input stops the session: a message that it cannot use is counted, and answered with a REPORT
  * that names what was refused (subject) and why (status). After END it waits for the next HEADER.
@@ -102,6 +103,9 @@ typedef struct plr_session_observer {
                     const plr_setting *culprit);
 } plr_session_observer;
 
+struct plr_eyes;         /* eyes.h */
+struct plr_picture_pair; /* vision.h */
+
 typedef struct plr_session_options {
     const plr_wire_setting *overrides; /* settings used instead of those in CONFIG and HEADER; of
                                           two with one id the later; must outlive the session */
@@ -117,6 +121,8 @@ typedef struct plr_session_options {
                                 messages; each id once. A flight log repeats them */
     unsigned map_count;      /* at most known_capacity */
     plr_state_store *store;  /* initialised; NULL: no storage. Must outlive the session */
+    struct plr_eyes *eyes; /* initialised; NULL: IMAGEs are refused once, and ignored. Must outlive
+                              the session */
     plr_session_observer observer;
 } plr_session_options;
 
@@ -134,7 +140,7 @@ typedef enum plr_step {
 
 /* Counts since init or since the HEADER that followed an END. */
 typedef struct plr_session_totals {
-    uint32_t twists, stereos, truths, landmarks, readings, imus; /* messages received */
+    uint32_t twists, stereos, truths, landmarks, readings, imus, images; /* messages received */
     /* Messages of any kind that were refused; frames that were skipped are in reader.counts. */
     uint32_t refused;
     uint32_t imu_readings;  /* in those messages */
@@ -218,6 +224,12 @@ static inline plr_status plr_session_init(plr_session *s, const plr_port *port,
  * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update, PLR_WIRE_MAX_IMU
  * readings, PLR_SESSION_HELD_FRAMES updates that waited, and, at END, one LANDMARK a slot. */
 plr_step plr_session_step(plr_session *s);
+
+/* With eyes: a pair of the program's own camera, between two steps; it is done with when the call returns. The
+ * frame that it shows goes on as a STEREO does.
+ * PLR_E_ARGUMENT a null pointer; PLR_E_MODE no eyes; PLR_E_NOT_READY before a HEADER, or its settings make no
+ * filter; else what plr_vision_track says, or PLR_E_CALIBRATION, _RANGE the cameras: answered as an IMAGE. */
+plr_status plr_session_look(plr_session *s, const struct plr_picture_pair *pair);
 
 /* Does what END does, for a stream that stopped without one: applies the twists that still wait,
  * sends the landmarks in the filter, and END. The next HEADER starts a new drive. */

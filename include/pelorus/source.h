@@ -39,14 +39,17 @@ typedef struct plr_alignment {
     uint8_t seen_to_move; /* 1: the pictures have shown that the body moves */
 } plr_alignment;
 
-/* What a start in motion has left of position and yaw (docs/MATH.md 19, the anchor). */
-typedef enum plr_anchored {
-    PLR_ANCHOR_DUE, /* the world is free, and will be laid anew */
-    PLR_ANCHORED,   /* both are fixed: by the start, or by the anchor after it */
-    /* The world was given by a covariance, a measured position or a map: the anchor will widen their
-     * variances by what the first second may have misled them. */
-    PLR_WORLD_IS_GIVEN
-} plr_anchored;
+/* How far the start of an IMU has come (docs/MATH.md 19); src/process/imu_phase.h says what leads on. A world is
+ * given by a pose with its covariance, a measured position or a map; else position and yaw are free. */
+typedef enum plr_imu_phase {
+    PLR_IMU_ALIGNS,             /* tilt and velocity are not known: nothing moves the state */
+    PLR_IMU_ALIGNS_IN_WORLD,    /* likewise, in a world that is given */
+    PLR_IMU_UNSETTLED,          /* started in motion: the anchor will lay the world anew */
+    PLR_IMU_UNSETTLED_IN_WORLD, /* likewise: it will widen the variances by what the first second
+                                   may have misled position and yaw */
+    PLR_IMU_SETTLED,            /* position and yaw are fixed: by the start, or by the anchor */
+    PLR_IMU_PHASES
+} plr_imu_phase;
 
 /* What an IMU adds to the state: src/process/imu.c. How readings usually come, `slow` to
  * `off_usual2`, is kept of twists, too: src/process/statistics.h. */
@@ -64,9 +67,8 @@ typedef struct plr_inertial {
     uint16_t repeated;      /* successive readings of the same numbers */
     uint16_t out_of_line;   /* successive readings refused as spikes */
     uint16_t frames;        /* that used observations since the start, up to the anchor */
-    uint8_t started;        /* 1: tilt and velocity are known */
+    uint8_t phase;          /* plr_imu_phase */
     uint8_t pose_given;     /* 1: plr_filter_set_pose was called */
-    uint8_t anchored;       /* plr_anchored: what is known of position and yaw since the start */
     uint8_t fault;          /* plr_imu_fault, found at the start or since */
     uint8_t doubts;         /* successive frames at which the mean reading did not fit gravity */
 } plr_inertial;
@@ -105,8 +107,8 @@ typedef struct plr_wheels {
     uint8_t count, latest; /* latest: the one that sent the last reading; count: none of them */
 } plr_wheels;
 
-/* The source of motion, twists or an IMU: what init was given, and from `reading_ns` on what its readings have
- * shown. Of sigmas the squares. */
+/* The source of motion, twists or an IMU: what init was given, up to `poses_are_given`; what is used for a time
+ * alone; and from `reading_ns` on what every reading changes. Of sigmas the squares. */
 typedef struct plr_source {
     plr_real velocity_variance[3], gyro_variance[3]; /* of twists, in the body's axes */
     plr_real bias_velocity_walk, bias_gyro_walk;     /* of twists: variance that a second adds */
@@ -120,6 +122,11 @@ typedef struct plr_source {
     uint8_t timing, noise;   /* plr_twist_timing; of twists plr_noise_kind */
     uint8_t poses_are_given; /* 1: in mapping, where no reading moves the pose */
 
+    /* The checksum has each of these only while it is used. */
+    plr_alignment alignment;   /* with an IMU, until it has started */
+    plr_velocities velocities; /* with twists, while any is known */
+    plr_wheels wheels;         /* once one has sent a reading */
+
     plr_time_ns reading_ns;         /* of the last twist or IMU reading */
     plr_real interval_s;            /* between the last two of them */
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
@@ -127,12 +134,9 @@ typedef struct plr_source {
     double bias_walked_s; /* for how long the biases have walked since that was their prior */
     uint32_t unused;      /* readings refused since the filter's time last moved */
     plr_inertial inertial;
+    uint64_t left_out; /* as plr_supervisor.left_out: rules that are left out, for measurements */
     uint8_t reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
-    /* Side by side, though each is used for a time alone: the checksum has them only then. */
-    plr_alignment alignment;   /* with an IMU, until it has started */
-    plr_velocities velocities; /* with twists, while any is known */
-    plr_wheels wheels;         /* once one has sent a reading */
 } plr_source;
 
 #endif

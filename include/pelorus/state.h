@@ -48,11 +48,12 @@ typedef struct plr_parameters {
 
 /* Checksums of the filter's memory, to find out whether something else wrote to it. */
 typedef struct plr_guard {
-    uint64_t constant, small, large;
+    uint64_t constant, moving, told, large;
 } plr_guard;
 
-/* The checksums depend on the order of the members: config to par never change after init, work
- * and evidence change without a checksum, guard is last. See src/filter/guard.h. */
+/* The checksums depend on the order of the members: config to par never change after init, source to belief
+ * hold what a reading changes in one piece, work and evidence change without a checksum, guard is last. See
+ * src/filter/guard.h. */
 typedef struct plr_filter {
     uint32_t magic; /* set by a successful init */
     plr_config config;
@@ -67,11 +68,11 @@ typedef struct plr_filter {
     plr_frame_evidence evidence; /* of this frame, for the supervisor */
 
     plr_supervisor supervisor;
+    plr_real recovery_P
+        [PLR_POSE_TRIANGLE];     /* the pose's covariance when it was last in order, plus the motion
+                                since; packed lower triangle */
     uint16_t frames_off_the_map; /* in succession, that rejected nearly all known landmarks */
     uint8_t clock_started;
-    plr_real recovery_P
-        [PLR_POSE_TRIANGLE]; /* the pose's covariance when it was last in order, plus the motion
-                                since; packed lower triangle */
     plr_totals totals;
     plr_guard guard;
 } plr_filter;

@@ -25,6 +25,8 @@ extern "C" {
 
 /* Before the search: does the picture show the present? */
 typedef struct plr_picture_evidence {
+    bool
+        may_repeat; /* false in the model `world`, where a picture that repeats is used all the same */
     unsigned matched, same; /* matched observations; of these, with the very pixels of last time */
     plr_real moved[PLR_POSE_DIM];    /* the motion by odometry since the last frame, m and rad */
     plr_real variance[PLR_POSE_DIM]; /* of its noise */
@@ -107,12 +109,26 @@ typedef struct plr_frame_evidence {
 
 /* ---------------------------------------------------------------- decisions */
 
+/* Before the search, for all of the frame; again where the filter begins anew in it. */
+typedef struct plr_picture_decision {
+    bool use;        /* false: the picture does not show the present, and nothing of it is used */
+    plr_real weight; /* a factor of the odometry's sigmas, 1 or more */
+    bool may_exclude_odometry; /* points may agree on a motion that the odometry excludes */
+    bool opens_fixed_gate;     /* a gate of fixed width would reject everything for ever */
+} plr_picture_decision;
+
 typedef struct plr_search_decision {
     bool wait;          /* use nothing of this frame: the next one shall confirm it */
     bool hold_biases;   /* the frame teaches the biases nothing */
     bool drop_rejected; /* the gate is locked: drop the landmarks that it rejected */
     bool make_none;     /* make no landmarks: the pose is probably wrong */
 } plr_search_decision;
+
+/* What is handed on through the stages of a frame. */
+typedef struct plr_decisions {
+    plr_picture_decision picture;
+    plr_search_decision search;
+} plr_decisions;
 
 typedef struct plr_frame_decision {
     plr_health health;
@@ -191,21 +207,31 @@ typedef struct plr_supervisor {
 
 /* ---------------------------------------------------------------- its thresholds */
 
-/* Every threshold of the supervisor: limits.def has value, unit, reason, and the scenario
- * and recording that need it. */
+/* Every threshold of detection: limits.def has value, unit, reason, and what needs it. First the rules, which
+ * plr_filter_leave_out can leave out, then the numbers that belong to one of them. */
 typedef enum plr_limit_id {
 #define LIMIT(name, value, off, unit, about, scenario, recording) PLR_LIMIT_##name,
+#define PART(name, value, unit, about, rule)
 #include "pelorus/limits.def"
 #undef LIMIT
+#undef PART
+    PLR_RULES,
+    PLR_LAST_RULE = PLR_RULES - 1,
+#define LIMIT(name, value, off, unit, about, scenario, recording)
+#define PART(name, value, unit, about, rule) PLR_LIMIT_##name,
+#include "pelorus/limits.def"
+#undef LIMIT
+#undef PART
     PLR_LIMITS
 } plr_limit_id;
 
 typedef struct plr_limit_row {
     const char *name, *unit, *about, *scenario, *recording;
+    const char *rule;  /* to which it belongs; NULL: it is a rule itself */
     double value, off; /* as it is; as it is where the rule is left out */
 } plr_limit_row;
 
-/* Row 0 to PLR_LIMITS - 1; NULL beyond. */
+/* Row 0 to PLR_LIMITS - 1, by plr_limit_id; NULL beyond. */
 const plr_limit_row *plr_limit_at(unsigned row);
 
 #ifdef __cplusplus

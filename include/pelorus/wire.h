@@ -12,6 +12,7 @@
 
 #include <stddef.h>
 
+#include "pelorus/rig.h"
 #include "pelorus/types.h"
 
 #ifdef __cplusplus
@@ -35,13 +36,15 @@ typedef enum plr_kind {
     PLR_KIND_READING = 13,
     PLR_KIND_IMU = 14,
     PLR_KIND_EVIDENCE = 15,
-    PLR_KIND_CALIBRATION = 16
+    PLR_KIND_CALIBRATION = 16,
+    PLR_KIND_IMAGE = 17,
+    PLR_KIND_RIG = 18
 } plr_kind;
 
 enum {
     PLR_WIRE_VERSION_MAJOR = 1,
-    PLR_WIRE_VERSION_MINOR = 8,
-    PLR_WIRE_KINDS = 16,     /* kinds are 1 to this */
+    PLR_WIRE_VERSION_MINOR = 9,
+    PLR_WIRE_KINDS = 18,     /* kinds are 1 to this */
     PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
     PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */
     PLR_WIRE_MAX_SETTINGS = 64,
@@ -59,6 +62,9 @@ enum {
 
 /* The smallest buffer of a reader: enough for all kinds but STEREO, CONFIG being the longest. */
 #define PLR_WIRE_MIN_BUFFER (PLR_WIRE_OVERHEAD + 11 + 9 * PLR_WIRE_MAX_SETTINGS)
+
+/* Most pixels of an IMAGE that every reader takes; a sender that knows its reader's buffer may send more. */
+#define PLR_WIRE_IMAGE_PIXELS (PLR_WIRE_MIN_BUFFER - PLR_WIRE_OVERHEAD - 19)
 
 typedef enum plr_body_axes {
     PLR_AXES_FLU = 0, /* forward, left, up */
@@ -222,8 +228,21 @@ typedef struct plr_state_message {
                                  of (rho, theta), m^2 and rad^2; zeros: it stood still */
 } plr_state_message;
 
-/* One message. The observations of a STEREO that was read are in the reader's array, and valid
- * until the next call on the reader. */
+typedef enum plr_side { PLR_SIDE_LEFT = 0, PLR_SIDE_RIGHT = 1 } plr_side;
+
+/* A band of one picture: pixels in the order of the rows. The first band has first_px 0, and each of the others
+ * goes on where the one before it ended; bands of the two sides may alternate. */
+typedef struct plr_image_message {
+    plr_time_ns t_ns; /* of the picture's first row */
+    uint8_t side;     /* plr_side */
+    uint16_t width_px, height_px;
+    uint32_t first_px; /* pixels of the picture before this band */
+    uint16_t count;    /* pixels of this band, 1 or more */
+    const uint8_t *pixels;
+} plr_image_message;
+
+/* One message. The observations of a STEREO that was read are in the reader's array, the pixels of an IMAGE
+ * in its buffer; both are valid until the next call on the reader. */
 typedef struct plr_message {
     plr_kind kind;
     uint16_t sequence;
@@ -244,6 +263,8 @@ typedef struct plr_message {
         plr_imu_message imu;
         plr_supervision evidence;
         plr_calibration_result calibration;
+        plr_image_message image;
+        plr_rig rig;
     } as;
 } plr_message;
 

@@ -5,6 +5,7 @@
 #include "board.h"
 #include "clock.h"
 #include "core.h"
+#include "eyes.h"
 #include "fault.h"
 #include "pelorus/pelorus.h"
 #include "pelorus/session.h"
@@ -67,6 +68,7 @@ int main(void) {
     options.known = known;
     options.known_capacity = KNOWN_LANDMARKS;
     options.store = storage();
+    options.eyes = firmware_eyes();
     options.observer = telemetry_observer(&session);
     if (plr_session_init(&session, &port, &options) != PLR_OK) {
         return 1; /* startup resets the board: only a broken build comes here */

@@ -8,6 +8,7 @@
 extern uint32_t _stack_guard[], _stack_bottom[];
 extern uint32_t _data_load[], _data_start[], _data_end[];
 extern uint32_t _bss_start[], _bss_end[];
+extern uint32_t _ccm_start[], _ccm_end[]; /* of a second memory; empty on most boards */
 
 enum { STACK_PAINT = 0x50454C4F /* "OLEP" in a memory dump */ };
 
@@ -44,6 +45,9 @@ static void load_data(void) {
         *to = *from++;
     }
     for (volatile uint32_t *to = _bss_start; to < _bss_end; ++to) {
+        *to = 0;
+    }
+    for (volatile uint32_t *to = _ccm_start; to < _ccm_end; ++to) {
         *to = 0;
     }
 }

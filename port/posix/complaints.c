@@ -26,6 +26,8 @@ static const char *const kind_names[COMPLAINT_KINDS] = {
     [PLR_KIND_IMU] = "IMU",
     [PLR_KIND_EVIDENCE] = "EVIDENCE",
     [PLR_KIND_CALIBRATION] = "CALIBRATION",
+    [PLR_KIND_IMAGE] = "IMAGE",
+    [PLR_KIND_RIG] = "RIG",
 };
 
 static const char *const skip_words[COMPLAINT_SKIPS] = {

@@ -247,7 +247,7 @@ static bool find_left_out(replay_options *options, char *problem) {
         while ((limit = plr_limit_at(row)) != NULL &&
                (strlen(limit->name) != n || memcmp(limit->name, name, n) != 0))
             row++;
-        if (limit == NULL) {
+        if (limit == NULL || limit->rule) {
             snprintf(problem, PROBLEM_SIZE,
                      "--without: %.*s is no rule; docs/SUPERVISION.md lists them", (int)n, name);
             return false;

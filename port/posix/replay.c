@@ -12,6 +12,7 @@
 #include "posix/help.h"
 #include "posix/map_in.h"
 #include "posix/options.h"
+#include "posix/pictures.h"
 #include "posix/progress.h"
 #include "posix/result_file.h"
 #include "posix/storage.h"
@@ -100,6 +101,8 @@ static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
         return totals->readings;
     case PLR_KIND_IMU:
         return totals->imus;
+    case PLR_KIND_IMAGE:
+        return totals->images;
     default:
         return 0;
     }
@@ -193,6 +196,7 @@ static plr_status start_session(replay *run) {
     options.deadline_us = run->options.deadline_us;
     options.output |= PLR_OUTPUT_ECHO | PLR_OUTPUT_EVIDENCE;
     options.left_out = run->options.left_out;
+    options.eyes = pictures_eyes();
     options.known = run->known;
     options.known_capacity = KNOWN_LANDMARKS;
     options.map = run->map_in.landmarks.items;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What Python has to ask the library before it calls it: tools/pelorus/native.py. */
+/* What Python has to ask the library before it calls it: tools/pelorus/native/binding.py. */
 #ifndef PELORUS_PYTHON_BINDING_H
 #define PELORUS_PYTHON_BINDING_H
 

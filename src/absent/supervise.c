@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "supervise/exclusion.h"
 #include "supervise/health.h"
 #include "supervise/readings.h"
 
@@ -18,10 +19,12 @@ void plr_supervise_begin(plr_supervisor *s, const plr_config *config) {
     plr_supervise_clock_set(s);
 }
 
-bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
+static const plr_picture_decision all_is_well = {.use = true, .weight = 1};
+
+plr_picture_decision plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
     (void)s;
     (void)e;
-    return true;
+    return all_is_well;
 }
 
 plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evidence *e) {
@@ -39,22 +42,13 @@ void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const p
         s->last_use_ns = e->readings.now_ns;
 }
 
-bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
-    (void)s;
-    return false;
-}
-
-bool plr_supervise_opens_fixed_gate(const plr_supervisor *s) {
-    (void)s;
-    return false;
-}
-
 void plr_supervise_pose_set(plr_supervisor *s) {
     (void)s;
 }
 
-void plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
+plr_picture_decision plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
     s->relocated = relocated;
+    return all_is_well;
 }
 
 void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
@@ -114,9 +108,21 @@ void plr_supervise_dead_reckons(plr_supervisor *s, const plr_readings_evidence *
     (void)now;
 }
 
-const plr_limit_row *plr_limit_at(unsigned row) {
-    (void)row;
-    return NULL;
+plr_misfit plr_exclusion_misfit(uint64_t left_out, const plr_exclusion_evidence *all,
+                                plr_real nu2) {
+    (void)left_out, (void)all, (void)nu2;
+    return PLR_MISFIT_NONE;
+}
+
+bool plr_exclusion_has_support(uint64_t left_out, const plr_exclusion_evidence *all,
+                               plr_misfit misfit) {
+    (void)left_out, (void)all, (void)misfit;
+    return false;
+}
+
+bool plr_exclusion_is_well_spread(uint64_t left_out, plr_real unobserved) {
+    (void)left_out, (void)unobserved;
+    return false;
 }
 
 #endif

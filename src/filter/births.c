@@ -8,6 +8,7 @@
 #include "pelorus/assertions.h"
 #include "sensor/stereo.h"
 #include "state/sightings.h"
+#include "supervise/supervise.h"
 
 bool plr_births_are_allowed(const plr_filter *f) {
     return f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
@@ -137,7 +138,8 @@ plr_status plr_births_restart(plr_filter *f, const plr_sightings *sightings,
             plr_slots_find(&f->belief, row->seen->id); /* a restart may have moved others */
         const plr_slot before = f->belief.slots[slot];
         const bool lost = row->verdict == PLR_GATE_LOST;
-        if (!lost && !(agrees && plr_track_may_restart(&before)))
+        if (!lost &&
+            !(agrees && plr_track_may_restart(&before, plr_supervise_left_out(&f->supervisor))))
             continue;
         const bool makes = plr_stereo_makes_landmark(&f->belief, &f->camera, row->seen);
         if (!lost && !makes)

@@ -32,6 +32,7 @@ static uint32_t hash_of_pixels(const plr_observation *o) {
 
 void plr_evidence_of_picture(plr_filter *f, const plr_sightings *sightings) {
     plr_picture_evidence *e = &f->evidence.picture;
+    e->may_repeat = f->config.model == PLR_MODEL_BODY;
     for (unsigned k = 0; k < sightings->count; k++) {
         const plr_sighting *row = &sightings->at[k];
         if (!plr_is_matched(row))
@@ -51,15 +52,15 @@ void plr_evidence_note_pose(const plr_filter *f, plr_evidence_pose *pose) {
 }
 
 void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
-                            const plr_applied_motion *stated, const plr_motion_first *first,
-                            const plr_correction *correction) {
+                            const plr_applied_motion *stated, plr_real weight,
+                            const plr_motion_first *first, const plr_correction *correction) {
     plr_motion_evidence *e = &f->evidence.motion;
     e->applied = true;
     e->outright = first->outright;
     memcpy(e->E, first->motion.E, sizeof e->E);
     memcpy(e->p, first->motion.p, sizeof e->p);
     memcpy(e->L, stated->L, sizeof e->L);
-    e->weight = plr_supervise_weight(&f->supervisor);
+    e->weight = weight;
     plr_mat6_vec(e->nu, first->motion.L, correction->nu);
     plr_motion_solve(stated->L, 1, e->nu, 1);
     memcpy(e->Lambda, correction->Lambda, sizeof e->Lambda);
@@ -162,7 +163,8 @@ plr_status plr_filter_leave_out(plr_filter *f, uint64_t limits) {
     const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
-    f->supervisor.left_out = limits;
+    plr_supervise_leave_out(&f->supervisor, limits);
+    f->source.left_out = limits;
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

@@ -22,10 +22,10 @@ void plr_evidence_of_picture(plr_filter *f, const plr_sightings *sightings);
 void plr_evidence_note_pose(const plr_filter *f, plr_evidence_pose *pose);
 
 /* After a correction: the motion by pictures beside that by odometry. `stated` is the odometry's, with the
- * sigmas that it states; `by_odometry` the pose by it. */
+ * sigmas that it states, `weight` the factor of these that the frame used; `by_odometry` the pose by it. */
 void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
-                            const plr_applied_motion *stated, const plr_motion_first *first,
-                            const plr_correction *correction);
+                            const plr_applied_motion *stated, plr_real weight,
+                            const plr_motion_first *first, const plr_correction *correction);
 
 /* Before the correction by a frame: true if it sees known landmarks, and `before` is filled. After it: what
  * they did to the pose. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
  * Where the IMU is on the body (settings imu-turn and imu-arm). Inside the filter the body's origin
- * is the IMU, with the body's axes; the caller's origin is elsewhere by the arm r = par.imu_arm. What
+ * is the IMU, with the body's axes; the caller's origin is elsewhere by the arm r = source.imu_arm. What
  * comes in and what goes out is changed here. Without an arm nothing is touched.
  */
 #ifndef PLR_FILTER_EXTRINSICS_H

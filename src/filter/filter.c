@@ -275,9 +275,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     /* readings and frames of another clock are not used any more */
     if (f->source.reading_ns > t_ns || t_ns - f->source.reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
-    if (f->supervisor.last_frame_ns > t_ns ||
-        t_ns - f->supervisor.last_frame_ns > f->par.max_gap_ns)
-        plr_supervise_clock_set(&f->supervisor);
+    plr_supervise_clock_set_to(&f->supervisor, t_ns, f->par.max_gap_ns);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }
@@ -340,7 +338,7 @@ plr_readings_evidence plr_filter_readings_at(const plr_filter *f, plr_time_ns no
                                    .needed = f->config.mode != PLR_MODE_MAPPING,
                                    .looks = f->config.mode != PLR_MODE_DEAD_RECKONING,
                                    .imu = imu,
-                                   .started = !imu || f->source.inertial.started,
+                                   .started = !imu || f->source.inertial.phase >= PLR_IMU_UNSETTLED,
                                    .unsettled = imu && plr_alignment_is_unsettled(&f->source),
                                    .fault_of_start = fault > PLR_IMU_FAULT_MOVES &&
                                                      fault < PLR_IMU_FAULT_SATURATED,

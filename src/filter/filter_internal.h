@@ -47,8 +47,10 @@ void plr_filter_store_for_recovery(plr_filter *f);
 void plr_filter_propagate_recovery(plr_filter *f);
 
 /* At the present pose: sets its covariance to P, drops the landmarks and the pending motion, takes the
- * velocity for unknown, and doubts the pose until pictures and twists agree. */
-void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], bool relocated);
+ * velocity for unknown, and doubts the pose until pictures and twists agree. Returns what the supervisor decides
+ * now of the frame at hand. */
+plr_picture_decision plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE],
+                                           bool relocated);
 
 /* The biases' covariance becomes their prior's, and the mean of one that is further from its own than so many
  * sigmas. Only without landmarks. */

@@ -1,28 +1,24 @@
 // SPDX-License-Identifier: MIT
 #include "filter/gate.h"
 
+#include "limits/limits.h"
 #include "math/small.h"
 #include "state/covariance.h"
 #include "state/sensitivity.h"
-#include "supervise/supervise.h"
 
-/* Ten sigmas. A point that begins to move is not off by so much from one frame to the next. */
-#define FAR_D2 PLR_R(100)
-
-plr_gate_result plr_gate_rejection(plr_real d2) {
-    return d2 > FAR_D2 ? PLR_GATE_FAR : PLR_GATE_REJECTED;
+plr_gate_result plr_gate_rejection(uint64_t left_out, plr_real d2) {
+    return d2 > plr_limit(left_out, PLR_LIMIT_FAR_D2) ? PLR_GATE_FAR : PLR_GATE_REJECTED;
 }
 
-bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2) {
+bool plr_gate_accepts(const plr_filter *f, bool opens, plr_real d2, plr_real residual2) {
     const bool fixed = f->par.gate_residual2 > 0;
     if (fixed && residual2 <= f->par.gate_residual2)
         return true;
-    return (!fixed || plr_supervise_opens_fixed_gate(&f->supervisor)) && plr_is_finite(d2) &&
-           (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
+    return (!fixed || opens) && plr_is_finite(d2) && (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
 }
 
 /* by_wheel: of errors of the wheels, too; NULL: it is no wheel's. */
-static plr_verdict judge(const plr_filter *f, const plr_measurement *m,
+static plr_verdict judge(const plr_filter *f, bool opens, const plr_measurement *m,
                          const plr_by_wheel *by_wheel) {
     plr_verdict verdict = {.accepted = false};
     plr_real full[9], S[6], e[3];
@@ -42,14 +38,14 @@ static plr_verdict judge(const plr_filter *f, const plr_measurement *m,
     plr_solve3_transposed(1, S, e);
     verdict.d2 = plr_dot3(e, e) + m->extra_d2;
     verdict.det_S = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
-    verdict.accepted = plr_gate_accepts(f, verdict.d2, m->residual2);
+    verdict.accepted = plr_gate_accepts(f, opens, verdict.d2, m->residual2);
     return verdict;
 }
 
-plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
-    return judge(f, m, NULL);
+plr_verdict plr_gate_judge(const plr_filter *f, bool opens, const plr_measurement *m) {
+    return judge(f, opens, m, NULL);
 }
 
 plr_verdict plr_gate_judge_wheel(const plr_filter *f, const plr_measurement *m) {
-    return judge(f, m, &m->by_wheel);
+    return judge(f, false, m, &m->by_wheel);
 }

@@ -27,11 +27,11 @@ typedef enum plr_gate_result {
 } plr_gate_result;
 
 /* Compares d^2 with `gate-d2`; with the setting `gate-residual`, the squared norm of the raw
- * residuals with that, px^2. */
-bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2);
+ * residuals with that, px^2, and d^2 only where the supervisor opens such a gate. */
+bool plr_gate_accepts(const plr_filter *f, bool opens, plr_real d2, plr_real residual2);
 
-/* PLR_GATE_REJECTED or PLR_GATE_FAR. */
-plr_gate_result plr_gate_rejection(plr_real d2);
+/* PLR_GATE_REJECTED or PLR_GATE_FAR. `left_out`: the supervisor's rules that are left out. */
+plr_gate_result plr_gate_rejection(uint64_t left_out, plr_real d2);
 
 static inline bool plr_gate_accepted(const plr_sighting *s) {
     PLR_ASSERT(plr_is_matched(s) && s->verdict != PLR_GATE_NOT_JUDGED);
@@ -44,7 +44,7 @@ static inline bool plr_gate_rejected(const plr_sighting *s) {
 
 /* Judges a measurement at the current estimate. It is rejected, whatever its residual is, if the
  * variance of a predicted row exceeds max_variance. */
-plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m);
+plr_verdict plr_gate_judge(const plr_filter *f, bool opens, const plr_measurement *m);
 
 /* The same of a wheel's reading: what its errors of scale and track explain is no slip. */
 plr_verdict plr_gate_judge_wheel(const plr_filter *f, const plr_measurement *m);

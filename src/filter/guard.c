@@ -4,106 +4,62 @@
 #include <string.h>
 
 #include "filter/filter_internal.h"
+#include "math/checksum.h"
 #include "math/finite.h"
 #include "math/small.h"
 #include "state/covariance.h"
 #include "state/polar.h"
 
-enum {
-    LANES = 8, /* sums side by side: some processors add them at once */
-    HEAD = (PLR_POSE_DIM + PLR_BIAS_DIM) * (PLR_POSE_DIM + PLR_BIAS_DIM + 1) / 2
-};
+enum { HEAD = (PLR_POSE_DIM + PLR_BIAS_DIM) * (PLR_POSE_DIM + PLR_BIAS_DIM + 1) / 2 };
 
 /* ---------------------------------------------------------------- sums */
 
-/* A checksum of memory, word by word. Each sum is rotated before the next word is added, so that it
- * depends on the order of the words. A change of a single word always changes the sum. */
-typedef struct plr_checksum {
-    uint32_t lane[LANES];
-} plr_checksum;
-
-static inline uint32_t turned(uint32_t sum) {
-    return sum >> 7 | sum << 25;
-}
-
-static void add(plr_checksum *sum, const void *memory, size_t bytes) {
-    const unsigned char *at = memory;
-    plr_checksum now = *sum;
-    uint32_t word = 0;
-    for (; bytes >= LANES * sizeof word; bytes -= LANES * sizeof word, at += LANES * sizeof word)
-        for (unsigned lane = 0; lane < LANES; lane++) {
-            memcpy(&word, at + lane * sizeof word, sizeof word);
-            now.lane[lane] = turned(now.lane[lane]) + word;
-        }
-    *sum = now;
-    for (unsigned lane = 0; lane < LANES && bytes > 0; lane++) {
-        const size_t part = bytes < sizeof word ? bytes : sizeof word;
-        word = 0;
-        if (part == sizeof word) /* always, as members go: a constant size is faster */
-            memcpy(&word, at, sizeof word);
-        else
-            memcpy(&word, at, part);
-        sum->lane[lane] = turned(sum->lane[lane]) + word;
-        at += part;
-        bytes -= part;
-    }
-}
-
 /* Members of the filter: from the beginning of one to that of another behind it. */
 #define ADD_BETWEEN(sum, f, from, to)                                                              \
-    add((sum), (const unsigned char *)(f) + offsetof(plr_filter, from),                            \
-        offsetof(plr_filter, to) - offsetof(plr_filter, from))
-
-/* A one-to-one function of `mixed` and of `word`. */
-static uint32_t step(uint32_t mixed, uint32_t word) {
-    mixed = (mixed ^ word) * 0x9E3779B1U;
-    return mixed ^ mixed >> 15;
-}
-
-static uint64_t mixed(const plr_checksum *sum) {
-    uint32_t low = 0, high = 0;
-    for (unsigned lane = 0; lane < LANES; lane++) {
-        low = step(low, sum->lane[lane]);
-        high = step(high, sum->lane[LANES - 1 - lane]);
-    }
-    return (uint64_t)high << 32 | low;
-}
+    plr_checksum_add((sum), (const unsigned char *)(f) + offsetof(plr_filter, from),               \
+                     offsetof(plr_filter, to) - offsetof(plr_filter, from))
 
 static uint64_t constant_sum(const plr_filter *f) {
-    plr_checksum sum = {{0}};
+    plr_checksum sum = plr_checksum_begin;
     ADD_BETWEEN(&sum, f, config, camera.estimate);
-    ADD_BETWEEN(&sum, f, source, source.reading_ns);
+    ADD_BETWEEN(&sum, f, source, source.alignment);
     ADD_BETWEEN(&sum, f, belief, belief.count);
-    return mixed(&sum);
+    return plr_checksum_mixed(&sum);
 }
 
-static uint64_t small_sum(const plr_filter *f) {
-    const size_t used = plr_covariance_size(&f->belief, f->belief.count);
-    plr_checksum sum = {{0}};
-    ADD_BETWEEN(&sum, f, camera.estimate, source);
-    ADD_BETWEEN(&sum, f, source.reading_ns, source.alignment);
-    ADD_BETWEEN(&sum, f, motion, belief);
-    ADD_BETWEEN(&sum, f, belief.count, belief.slots);
-    add(&sum, plr_covariance_elements(&f->belief), (used < HEAD ? used : HEAD) * sizeof(plr_real));
-    ADD_BETWEEN(&sum, f, clock_started, guard);
-    if (f->config.process == PLR_PROCESS_IMU && !f->source.inertial.started)
-        add(&sum, &f->source.alignment, sizeof f->source.alignment);
+static uint64_t moving_sum(const plr_filter *f) {
+    plr_checksum sum = plr_checksum_begin;
+    ADD_BETWEEN(&sum, f, camera.estimate.rate, source);
+    ADD_BETWEEN(&sum, f, source.reading_ns, belief.slots);
+    ADD_BETWEEN(&sum, f, frames_off_the_map, guard);
+    if (f->config.process == PLR_PROCESS_IMU && f->source.inertial.phase < PLR_IMU_UNSETTLED)
+        plr_checksum_add(&sum, &f->source.alignment, sizeof f->source.alignment);
     if (f->source.velocities_known)
-        add(&sum, &f->source.velocities, sizeof f->source.velocities);
+        plr_checksum_add(&sum, &f->source.velocities, sizeof f->source.velocities);
     if (f->source.wheels.count > 0)
-        add(&sum, &f->source.wheels, sizeof f->source.wheels);
-    return mixed(&sum);
+        plr_checksum_add(&sum, &f->source.wheels, sizeof f->source.wheels);
+    return plr_checksum_mixed(&sum);
+}
+
+static uint64_t told_sum(const plr_filter *f) {
+    const size_t used = plr_covariance_size(&f->belief, f->belief.count);
+    plr_checksum sum = plr_checksum_begin;
+    ADD_BETWEEN(&sum, f, camera.estimate, camera.estimate.rate);
+    plr_checksum_add(&sum, plr_covariance_elements(&f->belief),
+                     (used < HEAD ? used : HEAD) * sizeof(plr_real));
+    return plr_checksum_mixed(&sum);
 }
 
 static uint64_t large_sum(const plr_filter *f) {
-    plr_checksum sum = {{0}};
-    add(&sum, f->belief.slots, f->belief.count * sizeof *f->belief.slots);
-    ADD_BETWEEN(&sum, f, supervisor, clock_started);
-    add(&sum, plr_covariance_elements(&f->belief),
-        plr_covariance_size(&f->belief, f->belief.count) * sizeof(plr_real));
+    plr_checksum sum = plr_checksum_begin;
+    plr_checksum_add(&sum, f->belief.slots, f->belief.count * sizeof *f->belief.slots);
+    ADD_BETWEEN(&sum, f, supervisor, frames_off_the_map);
+    plr_checksum_add(&sum, plr_covariance_elements(&f->belief),
+                     plr_covariance_size(&f->belief, f->belief.count) * sizeof(plr_real));
     for (unsigned k = 0; k < f->camera.errors.count; k++)
-        add(&sum, f->belief.S[k], plr_covariance_dim(&f->belief) * sizeof *f->belief.S[k]);
-    return mixed(&sum);
+        plr_checksum_add(&sum, f->belief.S[k],
+                         plr_covariance_dim(&f->belief) * sizeof *f->belief.S[k]);
+    return plr_checksum_mixed(&sum);
 }
 
 /* ---------------------------------------------------------------- ranges */
@@ -157,13 +113,28 @@ plr_status plr_guard_check_constant(const plr_filter *f) {
     return constant_sum(f) == f->guard.constant ? PLR_OK : PLR_E_DAMAGED;
 }
 
-plr_status plr_guard_check(const plr_filter *f) {
+static plr_status check_moving(const plr_filter *f) {
     const plr_status status = plr_guard_check_constant(f);
     if (status != PLR_OK)
         return status;
     const bool sound = is_in_range(f) && plr_guard_is_pose(f->belief.R_WB, f->belief.p_WB) &&
-                       small_sum(f) == f->guard.small;
+                       moving_sum(f) == f->guard.moving;
     return sound ? PLR_OK : PLR_E_DAMAGED;
+}
+
+plr_status plr_guard_check(const plr_filter *f) {
+    const plr_status status = check_moving(f);
+    return status == PLR_OK && told_sum(f) != f->guard.told ? PLR_E_DAMAGED : status;
+}
+
+plr_status plr_guard_check_reading(const plr_filter *f) {
+    const plr_status status = check_moving(f);
+    if (status != PLR_OK)
+        return status;
+    const bool imu = f->config.process == PLR_PROCESS_IMU;
+    const bool uses_told =
+        imu ? f->source.inertial.phase < PLR_IMU_UNSETTLED : f->source.velocities_known;
+    return uses_told && told_sum(f) != f->guard.told ? PLR_E_DAMAGED : PLR_OK;
 }
 
 plr_status plr_guard_check_whole(const plr_filter *f) {
@@ -172,11 +143,12 @@ plr_status plr_guard_check_whole(const plr_filter *f) {
 }
 
 void plr_guard_seal(plr_filter *f) {
-    f->guard.small = small_sum(f);
+    f->guard.moving = moving_sum(f);
 }
 
 void plr_guard_seal_whole(plr_filter *f) {
     f->guard.large = large_sum(f);
+    f->guard.told = told_sum(f);
     plr_guard_seal(f);
 }
 

@@ -9,6 +9,7 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "filter/predict.h"
+#include "limits/limits.h"
 #include "math/finite.h"
 #include "math/small.h"
 #include "process/alignment.h"
@@ -17,16 +18,6 @@
 #include "state/calibration.h"
 #include "state/seconds.h"
 
-enum {
-    MOST_REPEATED = 10, /* successive readings of the same six numbers: noise never does that */
-    MOST_SPIKES = 2     /* successive ones: a third is no fault of the sensor but a shock */
-};
-
-/* A spike differs from the reading before by this many times what readings usually differ, and by
- * no less than this. */
-#define SPIKE_CHANGES PLR_R(30)
-#define SPIKE_ACCEL   PLR_R(60) /* m/s^2 */
-#define SPIKE_GYRO    PLR_R(10) /* rad/s */
 /* The largest velocity that can be set, m/s. */
 #define MAX_VELOCITY 1e4
 
@@ -36,17 +27,28 @@ static plr_status refuse(plr_filter *f, plr_status status, plr_imu_fault fault) 
     return plr_predict_refuse(f, status);
 }
 
-static bool is_at(double value, double range) {
-    return range > 0 && (value >= range || value <= -range);
+/* True if one of three numbers is at the end of the sensor's range; a range of 0 is not known. */
+static bool is_at_end(const double x[3], double range) {
+    if (!(range > 0))
+        return false;
+    for (unsigned i = 0; i < 3; i++)
+        if (x[i] >= range || x[i] <= -range)
+            return true;
+    return false;
 }
 
-static bool is_spike(const plr_filter *f, const plr_real change2[2]) {
-    const plr_real least[2] = {SPIKE_ACCEL, SPIKE_GYRO};
-    if (!f->source.reading_valid || f->source.inertial.out_of_line >= MOST_SPIKES)
+/* True if a reading differs from the one before by more than readings usually do, and than is possible. */
+static bool is_spike(const plr_source *source, const plr_real change2[2]) {
+    const uint64_t left_out = source->left_out;
+    const plr_real least[2] = {plr_limit(left_out, PLR_LIMIT_SPIKE_ACCEL),
+                               plr_limit(left_out, PLR_LIMIT_SPIKE_GYRO)};
+    const plr_real times = plr_limit(left_out, PLR_LIMIT_SPIKE_CHANGES);
+    if (!source->reading_valid ||
+        source->inertial.out_of_line >= plr_limit_count(left_out, PLR_LIMIT_MOST_SPIKES))
         return false;
     for (unsigned i = 0; i < 2; i++)
         if (change2[i] > least[i] * least[i] &&
-            change2[i] > SPIKE_CHANGES * SPIKE_CHANGES * f->source.inertial.change2[i])
+            change2[i] > times * times * source->inertial.change2[i])
             return true;
     return false;
 }
@@ -55,16 +57,15 @@ static bool is_spike(const plr_filter *f, const plr_real change2[2]) {
 static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
                                 const plr_real reading[PLR_POSE_DIM], const plr_real change2[2]) {
     plr_inertial *s = &f->source.inertial;
-    for (unsigned i = 0; i < 3; i++)
-        if (is_at(imu->a_B_mps2[i], f->config.accel_range_mps2) ||
-            is_at(imu->w_B_radps[i], f->config.gyro_range_radps))
-            return PLR_IMU_FAULT_SATURATED;
+    if (is_at_end(imu->a_B_mps2, f->config.accel_range_mps2) ||
+        is_at_end(imu->w_B_radps, f->config.gyro_range_radps))
+        return PLR_IMU_FAULT_SATURATED;
     const bool same = f->source.reading_valid &&
                       memcmp(reading, f->source.reading, sizeof f->source.reading) == 0;
     s->repeated = same ? (uint16_t)(s->repeated + (s->repeated < UINT16_MAX)) : 0;
-    if (s->repeated >= MOST_REPEATED)
+    if (s->repeated >= plr_limit_count(f->source.left_out, PLR_LIMIT_FROZEN_READINGS))
         return PLR_IMU_FAULT_FROZEN;
-    if (is_spike(f, change2)) {
+    if (is_spike(&f->source, change2)) {
         s->out_of_line++;
         return PLR_IMU_FAULT_SPIKE;
     }
@@ -74,7 +75,7 @@ static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
 
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *imu) {
     plr_real reading[PLR_POSE_DIM];
-    const plr_status sound = imu ? plr_guard_check(f) : PLR_E_ARGUMENT;
+    const plr_status sound = imu ? plr_guard_check_reading(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.process != PLR_PROCESS_IMU)
@@ -90,33 +91,30 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
         if (!plr_is_finite(reading[i]))
             return refuse(f, PLR_E_RANGE, PLR_IMU_FAULT_NONE);
 
-    const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
-    if (planned.status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
-        return plr_predict_accept(f, t_ns, reading, &planned);
+    plr_process_step step;
+    const plr_status planned = plr_predict_plan(f, t_ns, reading, &step);
+    if (planned != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
+        return plr_predict_accept(f, t_ns, reading, planned, &step);
     plr_real change2[2];
     plr_statistics_change(&f->source, reading, change2);
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
+    plr_statistics_learn(&f->belief, &f->source, t_ns, reading, step.interval, change2);
     plr_calibration_note_rate(&f->camera, &f->source, reading + 3);
-    if (f->source.inertial.started)
-        return plr_predict_accept(f, t_ns, reading, &planned);
+    if (f->source.inertial.phase >= PLR_IMU_UNSETTLED)
+        return plr_predict_accept(f, t_ns, reading, planned, &step);
     plr_alignment_add(&f->belief, &f->source, &f->config, t_ns, reading);
-    if (f->source.inertial.started)
+    if (f->source.inertial.phase >= PLR_IMU_UNSETTLED)
         plr_filter_store_for_recovery(f);
-    const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
+    const plr_status status = plr_predict_accept(f, t_ns, reading, planned, &step);
     plr_guard_seal_whole(f); /* the start sets P */
     return status;
 }
 
 /* ---------------------------------------------------------------- frames and the start */
 
-/* A point has moved if the square of its way in the picture exceeds so many times what is expected of two
- * still pixels in two directions: of still ones it is one in a thousand. */
-#define MOVED_ABOVE PLR_R(7)
-
-/* What is expected, px^2: pixels have noise, and tracks have wandered since the stretch began. */
+/* What is expected of a still point's squared way in the picture, px^2: pixels have noise, and tracks have wandered since the stretch began. */
 static plr_real still2(const plr_filter *f, const plr_observation *seen) {
     const plr_alignment *at = &f->source.alignment;
     const plr_real seconds = at->count > 0 ? plr_seconds(f->belief.t_ns - at->begin_ns) : PLR_R(0);
@@ -149,7 +147,8 @@ static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_o
                       bool early) {
     const plr_real du = (plr_real)(seen->uL_px - point->u_px);
     const plr_real dv = (plr_real)(seen->vL_px - point->v_px);
-    const bool elsewhere = du * du + dv * dv > MOVED_ABOVE * still2(f, seen);
+    const bool elsewhere =
+        du * du + dv * dv > plr_limit(f->source.left_out, PLR_LIMIT_POINT_MOVED) * still2(f, seen);
     const bool again = elsewhere && (point->used & PLR_POINT_MOVED);
     if (elsewhere && !(point->used & PLR_POINT_CONFIRMED))
         remember(point, seen, early);

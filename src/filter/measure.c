@@ -163,8 +163,8 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
         if (m[part].of_wheel)
             plr_wheels_differentiate(&f->belief, &f->source, &f->camera, reading, measured,
                                      rows[part].z, m[part].r, &m[part].by_wheel);
-        const plr_verdict verdict =
-            m[part].of_wheel ? plr_gate_judge_wheel(f, &m[part]) : plr_gate_judge(f, &m[part]);
+        const plr_verdict verdict = m[part].of_wheel ? plr_gate_judge_wheel(f, &m[part])
+                                                     : plr_gate_judge(f, false, &m[part]);
         result->d2 += (double)verdict.d2;
         accepted = accepted && verdict.accepted;
         if (reading->sensor == PLR_SENSOR_WHEEL)

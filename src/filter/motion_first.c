@@ -7,48 +7,34 @@
 #include "filter/linearisation.h"
 #include "filter/search.h"
 #include "filter/tracks.h"
+#include "limits/limits.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
 #include "state/motion.h"
+#include "state/seconds.h"
 #include "state/slots.h"
+#include "supervise/exclusion.h"
 #include "supervise/supervise.h"
 
 enum {
-    MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
-    MIN_AGAINST_TWISTS = 6, /* fewer points outweigh the twists only if all of them agree */
-    MIN_POOR = 6,           /* fewer points do not show that a search found the wrong minimum */
-    MIN_AGREEING = 6,       /* fewer points do not tell a motion of which nothing else is known */
-    MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
+    MIN_POINTS = 3,   /* of fewer points none can be checked by the others */
+    MIN_POOR = 6,     /* fewer points do not show that a search found the wrong minimum */
+    MIN_AGREEING = 6, /* fewer points do not tell a motion of which nothing else is known */
+    MORE_SEARCHES = 2 /* at most, if the first ends beside the minimum */
 };
 
-/* A search has failed if the observations keep less than this share of their weight, or if |nu|^2
- * is beyond FAR_FROM_TWISTS. */
-#define LARGE_SHARE     PLR_R(0.7)
-#define FAR_FROM_TWISTS PLR_R(36)
-/* An observation supports one of two motions if its squared residual is smaller there by more than
- * this. */
-#define CLEAR_DIFFERENCE PLR_R(9)
-/* It agrees with a motion if its squared residual is below this: 97 % of the points at rest do. */
-#define AGREES_BELOW PLR_R(9)
-/* Points are well spread if no direction of the motion keeps a larger part of the open prior's
- * variance. */
-#define UNOBSERVED PLR_R(0.25)
 /* An observation is judged by the motion of all others only if they contribute at least about this
  * share to its prediction. Below it the observation has determined the motion itself. */
 #define LEAST_SHARE PLR_R(0.05)
 
-/* A landmark that no frame of this time saw was out of sight; a motion that no frame of this time
- * measured was in the dark. */
-#define UNSEEN_NS 1000000000U
-#define DARK_S    PLR_R(1)
-
 /* True if a landmark was out of sight before this frame, and may be lost. */
 static bool is_unseen(const plr_search *s, unsigned i) {
     const plr_slot *slot = plr_search_slot(s, i);
-    return !slot->known && s->f->belief.t_ns - slot->last_seen_ns > UNSEEN_NS;
+    return !slot->known &&
+           s->f->belief.t_ns - slot->last_seen_ns > plr_limit_ns(s->left_out, PLR_LIMIT_UNSEEN_MS);
 }
 
 /* True if its bearing is too uncertain to linearise at, though the motion were known: the pose drifted
@@ -58,8 +44,9 @@ static bool is_lost(const plr_search *s, unsigned i) {
     return is_unseen(s, i) && !(P[0] <= limit && P[4] <= limit);
 }
 
+/* True if no frame has measured the motion for long. */
 static bool is_dark(const plr_search *s) {
-    return s->f->motion.seconds > DARK_S;
+    return s->f->motion.seconds > plr_seconds(plr_limit_ns(s->left_out, PLR_LIMIT_DARK_MS));
 }
 
 /* True if a rejected landmark is lost, because its bearing is too uncertain. What drifted in a darkness is
@@ -186,12 +173,12 @@ static plr_gate_result judge(plr_search *s, unsigned i, bool found, const plr_re
         d2 = share >= LEAST_SHARE ? without_it : d2;
     }
     *judged_d2 = d2 += plr_stereo_row_gap_d2(&s->f->camera, plr_search_row(s, i)->seen);
-    const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i));
+    const bool accepted = plr_gate_accepts(s->f, s->opens_fixed_gate, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
-        plr_track_add(slot, e);
+        plr_track_add(slot, s->left_out, e);
     if (!accepted)
-        return plr_gate_rejection(d2);
+        return plr_gate_rejection(s->left_out, d2);
     return slot->moving ? PLR_GATE_REJECTED : PLR_GATE_ACCEPTED;
 }
 
@@ -203,64 +190,30 @@ static plr_real telling(const plr_residual *at) {
     return PLR_SQRT(sum);
 }
 
-/* True if an observation agrees with the motion at the point evaluated last. */
-static bool agrees(const plr_residual *at) {
-    return !at->behind && plr_dot3(at->e, at->e) < AGREES_BELOW;
+/* A point as it is at the point evaluated last. */
+static plr_excluding_point excluding_point(const plr_residual *at) {
+    return (plr_excluding_point){.active = at->active,
+                                 .weight = at->weight,
+                                 .d2 = plr_dot3(at->e, at->e),
+                                 .by_odometry_d2 = at->twist_d2,
+                                 .behind = at->behind,
+                                 .tells = telling(at)};
 }
 
-/* Of the observations that take part, how many agree. */
-typedef struct plr_agreement {
-    unsigned active, agree;
-} plr_agreement;
-
-static plr_agreement count_agreement(const plr_search *s) {
-    plr_agreement a = {0, 0};
+static plr_exclusion_evidence count_points(const plr_search *s) {
+    plr_exclusion_evidence all = {0};
     for (unsigned i = 0; i < s->count; i++) {
-        const bool active = s->residuals[i].active > 0;
-        a.active += active;
-        a.agree += active && agrees(&s->residuals[i]);
+        const plr_excluding_point point = excluding_point(&s->residuals[i]);
+        plr_exclusion_add(s->left_out, &all, &point);
     }
-    return a;
+    return all;
 }
 
-static bool is_three_fifths(plr_agreement a) {
-    return 5 * a.agree >= 3 * a.active;
-}
-
-/* Which observations have a small weight, so that another motion may fit them better. */
-typedef enum plr_misfit {
-    PLR_MISFIT_NONE,
-    PLR_MISFIT_FEW, /* but they tell most of the translation: all others are distant */
-    PLR_MISFIT_MANY
-} plr_misfit;
-
-static plr_misfit find_misfit(const plr_search *s, const plr_search_point *best) {
-    plr_real active = 0, weight = 0, told = 0, told_by_misfits = 0;
-    unsigned misfits = 0; /* only these can come to support another motion */
-    for (unsigned i = 0; i < s->count; i++) {
-        const plr_residual *at = &s->residuals[i];
-        active += at->active;
-        weight += at->weight;
-        if (!(at->active > 0))
-            continue;
-        told += telling(at);
-        if (plr_dot3(at->e, at->e) > CLEAR_DIFFERENCE) {
-            misfits++;
-            told_by_misfits += telling(at);
-        }
-    }
-    if (misfits < MIN_POINTS)
-        return PLR_MISFIT_NONE;
-    if (weight < LARGE_SHARE * active || plr_norm2_of_6(best->z) > FAR_FROM_TWISTS)
-        return PLR_MISFIT_MANY;
-    return PLR_R(2) * told_by_misfits > told ? PLR_MISFIT_FEW : PLR_MISFIT_NONE;
-}
-
-/* True if the observations determine the motion in all six directions. */
-static bool is_well_spread(const plr_search_point *point) {
-    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, C[PLR_POSE_SQUARE] = {0};
+/* The largest share of the open prior's variance that a direction of the motion keeps. */
+static plr_real largest_unobserved(const plr_search_point *point) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, C[PLR_POSE_SQUARE] = {0}, most = 0;
     if (!plr_search_factorise(point, 0, U))
-        return false;
+        return 1;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         C[(PLR_POSE_DIM + 1) * k] = 1;
     plr_solve_upper_transposed(PLR_POSE_DIM, PLR_POSE_DIM, U, C, PLR_POSE_DIM);
@@ -268,41 +221,15 @@ static bool is_well_spread(const plr_search_point *point) {
         plr_real left = 0;
         for (unsigned r = 0; r < PLR_POSE_DIM; r++)
             left = PLR_FMA(C[PLR_POSE_DIM * r + k], C[PLR_POSE_DIM * r + k], left);
-        if (left > UNOBSERVED)
-            return false;
+        most = left > most ? left : most;
     }
-    return true;
+    return most;
 }
 
-/* True if enough observations support the motion found without the twists: at least three, a fifth
- * of all, and four times as many as support the twists. An observation supports the motion that it
- * agrees with, if the other one fits it clearly worse; a wrong match agrees with neither, and is
- * nearer to one of them by chance. If few misfit, those three tell more about the translation than
- * all others do. They must be well spread. Of six and more, three fifths must agree with the motion.
- * Of three to five all must, whether they took part in the search or not: three of five may lie on
- * one car, which pulls the estimate of the others with it. If all agree, wheels that slip are likelier
- * than a scene that moves as one, and the supervisor says what follows. */
 static bool has_support(const plr_search *s, const plr_search_point *open, plr_misfit misfit) {
-    const plr_agreement all = count_agreement(s);
-    unsigned with = 0, against = 0;
-    plr_real told = 0, told_against = 0;
-    for (unsigned i = 0; i < s->count; i++) {
-        const plr_residual *at = &s->residuals[i];
-        const plr_real d2 = plr_dot3(at->e, at->e);
-        if (!(at->active > 0))
-            continue;
-        told += telling(at);
-        if (agrees(at) && at->twist_d2 > d2 + CLEAR_DIFFERENCE) {
-            against++;
-            told_against += telling(at);
-        }
-        with += at->twist_d2 < AGREES_BELOW && d2 > at->twist_d2 + CLEAR_DIFFERENCE;
-    }
-    const bool enough =
-        misfit == PLR_MISFIT_MANY ? 5 * against >= all.active : PLR_R(2) * told_against > told;
-    return against >= MIN_POINTS && enough && 4 * with <= against &&
-           (all.active < MIN_AGAINST_TWISTS ? all.agree == s->count : is_three_fifths(all)) &&
-           is_well_spread(open);
+    const plr_exclusion_evidence all = count_points(s);
+    return plr_exclusion_has_support(s->left_out, &all, misfit) &&
+           plr_exclusion_is_well_spread(s->left_out, largest_unobserved(open));
 }
 
 /* Searches again with a prior so wide that the twists hardly count; where most do not agree with the
@@ -312,7 +239,8 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
 static PLR_SELDOM bool search_without_twists(plr_search *s, plr_search_point *best,
                                              plr_misfit misfit) {
     const plr_applied_motion stated = s->prior;
-    const bool most_agree = is_three_fifths(count_agreement(s));
+    const plr_exclusion_evidence all = count_points(s);
+    const bool most_agree = plr_exclusion_most_agree(&all);
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
         s->residuals[i].twist_d2 = plr_dot3(s->residuals[i].e, s->residuals[i].e);
@@ -356,7 +284,7 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
         changed = changed || (was_active && !(at->active > 0));
     }
     for (unsigned i = 0; active < MIN_POINTS && i < s->count; i++)
-        if (!plr_gate_accepts(s->f, s->residuals[i].prior_d2, 0)) {
+        if (!plr_gate_accepts(s->f, s->opens_fixed_gate, s->residuals[i].prior_d2, 0)) {
             changed = changed || s->residuals[i].active > 0;
             s->residuals[i].active = 0;
         }
@@ -381,8 +309,8 @@ static PLR_SELDOM unsigned search_by_agreement(plr_search *s, plr_search_point *
         plr_search_from_zero(s, best);
         for (unsigned again = 0; again <= MORE_SEARCHES; again++)
             plr_search_descend(s, best);
-        const plr_agreement all = count_agreement(s);
-        if (all.agree >= MIN_AGREEING && is_three_fifths(all))
+        const plr_exclusion_evidence all = count_points(s);
+        if (all.agree >= MIN_AGREEING && plr_exclusion_most_agree(&all))
             return active;
     }
     let_unknown_take_part(s);
@@ -404,8 +332,10 @@ static bool fits_poorly(const plr_search *s) {
         if (!(at->active > 0))
             continue;
         active++;
-        const bool allowed = plr_gate_accepts(s->f, at->prior_d2 * ASTRAY_SHARE, 0);
-        poor += allowed && (at->behind || !plr_gate_accepts(s->f, plr_dot3(at->e, at->e), 0));
+        const bool allowed =
+            plr_gate_accepts(s->f, s->opens_fixed_gate, at->prior_d2 * ASTRAY_SHARE, 0);
+        poor += allowed && (at->behind || !plr_gate_accepts(s->f, s->opens_fixed_gate,
+                                                            plr_dot3(at->e, at->e), 0));
     }
     return active >= MIN_POOR && 4 * poor >= active;
 }
@@ -447,13 +377,16 @@ static void judge_all(plr_search *s, bool found, const plr_real *U, const plr_re
     }
 }
 
-void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *first) {
-    plr_search s = {
-        .f = f, .sightings = sightings, .residuals = (plr_residual *)(void *)f->work.Vt};
+void plr_motion_find(plr_filter *f, plr_sightings *sightings, const plr_picture_decision *decided,
+                     plr_motion_first *first) {
+    plr_search s = {.f = f,
+                    .sightings = sightings,
+                    .residuals = (plr_residual *)(void *)f->work.Vt,
+                    .opens_fixed_gate = decided->opens_fixed_gate,
+                    .left_out = plr_supervise_left_out(&f->supervisor)};
     plr_search_point best;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
-    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, plr_supervise_weight(&f->supervisor),
-                     &s.prior);
+    plr_motion_prior(&f->belief, &f->motion, &f->work.noise, decided->weight, &s.prior);
     const unsigned unknown = enter(&s);
     plr_search_from_zero(&s, &best);
     unsigned active = judge_all_by_prior(&s, &best);
@@ -464,9 +397,11 @@ void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *
         plr_search_descend(&s, &best);
     for (unsigned again = 0; again < MORE_SEARCHES && fits_poorly(&s); again++)
         plr_search_descend(&s, &best);
-    const plr_misfit misfit = found && plr_supervise_may_exclude_odometry(&f->supervisor)
-                                  ? find_misfit(&s, &best)
-                                  : PLR_MISFIT_NONE;
+    plr_misfit misfit = PLR_MISFIT_NONE;
+    if (found && decided->may_exclude_odometry) {
+        const plr_exclusion_evidence all = count_points(&s);
+        misfit = plr_exclusion_misfit(s.left_out, &all, plr_norm2_of_6(best.z));
+    }
     first->outright = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
     found = found && plr_search_factorise(&best, 0, U);
     if (found)

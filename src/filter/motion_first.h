@@ -20,6 +20,7 @@ typedef struct plr_motion_first {
 
 /* Finds nu and gates every matched observation: verdict, d2 and det_S of its row. Call it before the motion
  * is applied to landmarks and P. */
-void plr_motion_find(plr_filter *f, plr_sightings *sightings, plr_motion_first *first);
+void plr_motion_find(plr_filter *f, plr_sightings *sightings, const plr_picture_decision *decided,
+                     plr_motion_first *first);
 
 #endif

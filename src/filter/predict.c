@@ -207,36 +207,34 @@ static void store_reading(plr_filter *f, plr_time_ns t_ns, const plr_real readin
     f->totals.twists++;
 }
 
-plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
-                                  const plr_real reading[PLR_POSE_DIM]) {
-    plr_planned_step planned = {.status = PLR_OK};
+plr_status plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
+                            const plr_real reading[PLR_POSE_DIM], plr_process_step *step) {
     if (f->config.mode == PLR_MODE_MAPPING)
-        return planned;
-    planned.status = check_time(f, t_ns);
-    if (planned.status != PLR_OK)
-        return planned;
-    plr_process_step *step = &planned.step;
-    plr_process_of(&f->source)->mean(&f->belief, &f->source, t_ns, reading, step);
+        return PLR_OK;
+    const plr_status status = check_time(f, t_ns);
+    if (status != PLR_OK)
+        return status;
     step->seconds = f->clock_started ? plr_seconds(t_ns - f->belief.t_ns) : 0;
-    step->interval =
-        f->source.reading_valid ? plr_seconds(t_ns - f->source.reading_ns) : step->seconds;
+    step->interval = f->source.reading_valid && f->source.reading_ns != f->belief.t_ns
+                         ? plr_seconds(t_ns - f->source.reading_ns)
+                         : step->seconds;
+    plr_process_of(&f->source)->mean(&f->belief, &f->source, t_ns, reading, step);
     if (plr_process_of(&f->source)->check(&f->belief, &f->source, step->mean, step->seconds) !=
             PLR_OK ||
         check_reading(f, reading, step->interval) != PLR_OK)
-        planned.status = PLR_E_RANGE;
-    return planned;
+        return PLR_E_RANGE;
+    return PLR_OK;
 }
 
 plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                              const plr_planned_step *planned) {
-    if (planned->status != PLR_OK)
-        return plr_predict_refuse(f, planned->status);
+                              plr_status planned, const plr_process_step *step) {
+    if (planned != PLR_OK)
+        return plr_predict_refuse(f, planned);
     if (f->config.mode == PLR_MODE_MAPPING) {
         f->totals.twists++;
         plr_guard_seal(f);
         return PLR_OK;
     }
-    const plr_process_step *step = &planned->step;
     if (step->seconds > 0 && plr_process_has_started(&f->source)) {
         take_step(f, t_ns, step);
         add_missed(f, step->interval - step->seconds, step->interval, reading);
@@ -248,7 +246,7 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
 }
 
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
-    const plr_status sound = twist ? plr_guard_check(f) : PLR_E_ARGUMENT;
+    const plr_status sound = twist ? plr_guard_check_reading(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.process != PLR_PROCESS_TWIST)
@@ -263,11 +261,12 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
         if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
             return plr_predict_refuse(f, PLR_E_RANGE);
     }
-    const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
-    if (planned.status == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
+    plr_process_step step;
+    const plr_status planned = plr_predict_plan(f, t_ns, reading, &step);
+    if (planned == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
         plr_real change2[2];
         plr_statistics_change(&f->source, reading, change2);
-        plr_statistics_learn(&f->belief, &f->source, t_ns, reading, planned.step.interval, change2);
+        plr_statistics_learn(&f->belief, &f->source, t_ns, reading, step.interval, change2);
     }
-    return plr_predict_accept(f, t_ns, reading, &planned);
+    return plr_predict_accept(f, t_ns, reading, planned, &step);
 }

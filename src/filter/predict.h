@@ -10,25 +10,20 @@
 /* Carries the pose to t_ns by the last reading. */
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns);
 
-/* The step that ends with a reading of the process (process/process.h). */
-typedef struct plr_planned_step {
-    plr_status status;     /* PLR_OK, or why the reading is refused */
-    plr_process_step step; /* seconds: since the filter's time; interval: since the last reading, or
-                        * since the pose was set */
-} plr_planned_step;
-
-/* Plans the step of a reading at t_ns; changes nothing. In mapping there is none. */
-plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
-                                  const plr_real reading[PLR_POSE_DIM]);
+/* Plans the step that ends with a reading at t_ns (process/process.h): its seconds are those since the filter's
+ * time, its interval that since the last reading, or since the pose was set. PLR_OK, or why the reading is refused:
+ * then, and in mapping, where there is none, the step is not filled. Changes nothing. */
+plr_status plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
+                            const plr_real reading[PLR_POSE_DIM], plr_process_step *step);
 
 /* Moves the state by a reading as planned, or counts a refused one. */
 plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                              const plr_planned_step *planned);
+                              plr_status planned, const plr_process_step *step);
 
 /* Counts a reading that is refused, and returns the status. While none is taken the pose's covariance grows. */
 plr_status plr_predict_refuse(plr_filter *f, plr_status status);
 
-/* Applies D' to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
+/* Applies a motion D' (state/motion.h) to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
  * noise is kept in work.noise, not in P, until plr_covariance_close_noise. PLR_E_DIVERGED if a variance is
  * no longer positive; likewise the two below. */
 plr_status plr_predict_apply(plr_filter *f, const plr_applied_motion *applied);

@@ -80,7 +80,8 @@ void plr_filter_propagate_recovery(plr_filter *f) {
     pack(f, carried);
 }
 
-void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], bool relocated) {
+plr_picture_decision plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE],
+                                           bool relocated) {
     double P_xi[PLR_POSE_SQUARE];
     pack(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
@@ -91,8 +92,8 @@ void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], boo
     f->work.noise.open = 0;
     plr_motion_clear(&f->belief, &f->motion);
     plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_xi);
-    plr_supervise_begun_anew(&f->supervisor, relocated);
     plr_filter_begin_velocity(f);
+    return plr_supervise_begun_anew(&f->supervisor, relocated);
 }
 
 void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas) {
@@ -130,7 +131,7 @@ void plr_filter_recover(plr_filter *f) {
         plr_sensitivity_add_to(&f->belief, &f->camera, plr_row_of(&f->belief, PLR_BLOCK_POSE),
                                PLR_POSE_DIM, P);
     f->totals.recoveries++;
-    plr_filter_begin_anew(f, P, false);
+    (void)plr_filter_begin_anew(f, P, false);
     plr_calibration_doubt(&f->camera);
     plr_filter_begin_prior_bias(f, 4); /* what is known of them may be what has broken down */
 }

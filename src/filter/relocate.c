@@ -9,6 +9,7 @@
 #include "filter/predict.h"
 #include "known_map/find.h"
 #include "known_map/lookup.h"
+#include "limits/limits.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "process/alignment.h"
@@ -20,8 +21,6 @@
 #include "state/sightings.h"
 #include "supervise/supervise.h"
 
-enum { OFF_FRAMES = 10 }; /* successive frames, as for a locked gate */
-
 /* The pose's variance before the update, as a multiple of the one by which the frame tells the
  * pose. The update uses the frame again, because it makes the correlations between pose and
  * landmarks, and the frame is counted twice by a hundredth then. */
@@ -29,12 +28,14 @@ enum { OFF_FRAMES = 10 }; /* successive frames, as for a locked gate */
 
 /* A step towards a pose is exact to first order, so it takes some. */
 enum { STEPS = 3 };
-/* Chi-square with 6 degrees of freedom: chance exceeds it once in 60,000. */
-#define FAR_ABOVE PLR_R(32)
 /* Known landmarks that come in again tell the pose a second time. That is allowed only where the
  * frame alone tells it better than all before: where each variance of the pose is at least this
  * multiple of the frame's. */
 #define WIDE_ENOUGH PLR_R(1)
+
+static unsigned off_frames(const plr_filter *f) {
+    return plr_limit_count(plr_supervise_left_out(&f->supervisor), PLR_LIMIT_OFF_MAP_FRAMES);
+}
 
 void plr_relocate_watch(plr_filter *f, const plr_sightings *sightings, unsigned unplaced) {
     unsigned seen = unplaced, off = unplaced;
@@ -51,7 +52,7 @@ void plr_relocate_watch(plr_filter *f, const plr_sightings *sightings, unsigned 
         return; /* says nothing */
     if (5 * off < 4 * seen)
         f->frames_off_the_map = 0;
-    else if (f->frames_off_the_map < OFF_FRAMES)
+    else if (f->frames_off_the_map < off_frames(f))
         f->frames_off_the_map++;
 }
 
@@ -71,31 +72,33 @@ static void take_up(plr_filter *f, const plr_sightings *sightings, const plr_see
     }
 }
 
-static void begin_at(plr_filter *f, const plr_sightings *sightings, const plr_found_pose *found) {
+static plr_picture_decision begin_at(plr_filter *f, const plr_sightings *sightings,
+                                     const plr_found_pose *found) {
     const bool again = plr_supervise_was_relocated(&f->supervisor);
     plr_real P[PLR_POSE_SQUARE];
     memcpy(f->belief.R_WB, found->R_WB, sizeof f->belief.R_WB);
     memcpy(f->belief.p_WB, found->p_WB, sizeof f->belief.p_WB);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = WIDER * found->P_xi[i];
-    plr_filter_begin_anew(f, P, true);
+    const plr_picture_decision decided = plr_filter_begin_anew(f, P, true);
     if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
         plr_filter_begin_prior_bias(f, 4);
     plr_alignment_keep_world(&f->source);
     take_up(f, sightings, plr_seen_known_of(f->work.Vt), found->count);
+    return decided;
 }
 
-bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings,
-                            plr_frame_events *events) {
+bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings, plr_frame_events *events,
+                            plr_picture_decision *decided) {
     plr_found_pose found;
-    if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(&f->config, &f->map))
+    if (f->frames_off_the_map < off_frames(f) || !plr_map_is_asked(&f->config, &f->map))
         return false;
     f->frames_off_the_map = 0;
     events->lost_in_map =
         !plr_find_pose(&f->belief, &f->camera, &f->map, f->work.Vt, sightings, false, &found);
     if (events->lost_in_map)
         return false;
-    begin_at(f, sightings, &found);
+    *decided = begin_at(f, sightings, &found);
     return true;
 }
 
@@ -187,8 +190,9 @@ static void replace_pose(plr_filter *f, const plr_found_pose *found,
     plr_covariance_add(&f->belief, PLR_BLOCK_POSE, P);
 }
 
-static bool is_far(const plr_pose_gap *gap) {
-    return plr_norm2_of_6(gap->nu) > FAR_ABOVE;
+static bool is_far(const plr_filter *f, const plr_pose_gap *gap) {
+    return plr_norm2_of_6(gap->nu) >
+           plr_limit(plr_supervise_left_out(&f->supervisor), PLR_LIMIT_MOVED_FAR);
 }
 
 /* Moves to the pose that was found, by which the landmarks come in. If it is too far, what was
@@ -197,10 +201,10 @@ static bool is_far(const plr_pose_gap *gap) {
 static plr_status go_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap,
                         bool replaces, const plr_real P_wide[PLR_POSE_SQUARE],
                         plr_frame_events *events) {
-    if (!replaces && !is_far(gap))
+    if (!replaces && !is_far(f, gap))
         return move_to(f, found, gap);
     replace_pose(f, found, P_wide);
-    if (!is_far(gap))
+    if (!is_far(f, gap))
         return PLR_OK;
     f->totals.widened++;
     events->moved_far = true;

@@ -20,9 +20,10 @@ void plr_relocate_watch(plr_filter *f, const plr_sightings *sightings, unsigned 
  * frame. The pose's sigmas are ten times those that the frame tells, until the update with this
  * frame. If it comes to that again before the pose is out of doubt, an IMU's biases begin at their
  * prior, too. (Twists that are wrong would teach theirs.) If no pose is found,
- * events->lost_in_map. Works in work.Vt. */
-bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings,
-                            plr_frame_events *events);
+ * events->lost_in_map. `decided`: what the supervisor has decided of the picture; anew, where the filter begins
+ * anew. Works in work.Vt. */
+bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings, plr_frame_events *events,
+                            plr_picture_decision *decided);
 
 typedef enum plr_relocation {
     PLR_PLACED,  /* nothing was changed */

@@ -144,7 +144,7 @@ void plr_search_add(plr_search *s, unsigned row, plr_real active) {
     memcpy(at->U[s->current], identity, sizeof at->U[0]);
     at->active = active;
     at->trimmed = false;
-    at->cost = 0;
+    at->cost = at->twist_d2 = 0;
 }
 
 void plr_search_prepare(plr_search *s) {

@@ -40,7 +40,9 @@ typedef struct plr_search {
     const plr_sightings *sightings;
     plr_residual *residuals; /* in work.Vt, which is free until the motion is applied */
     unsigned count;
-    unsigned current; /* which U belongs to the best point */
+    bool opens_fixed_gate; /* plr_picture_decision */
+    uint64_t left_out;     /* rules of the supervisor */
+    unsigned current;      /* which U belongs to the best point */
     plr_applied_motion prior;
 } plr_search;
 

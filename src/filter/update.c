@@ -88,7 +88,8 @@ static void choose(plr_filter *f, plr_sightings *frame, plr_report *report) {
 
 /* Gates each row by its own prediction, when the motion has been applied already, and keeps the
  * measurements. */
-static void gate_each(plr_filter *f, plr_sightings *frame) {
+static void gate_each(plr_filter *f, plr_sightings *frame, bool opens) {
+    const uint64_t left_out = plr_supervise_left_out(&f->supervisor);
     for (unsigned k = 0; k < frame->count; k++) {
         plr_sighting *row = &frame->at[k];
         if (!plr_is_matched(row))
@@ -96,11 +97,11 @@ static void gate_each(plr_filter *f, plr_sightings *frame) {
         plr_verdict verdict = {.accepted = false};
         plr_measurement m;
         if (plr_stereo_measure(&f->belief, &f->camera, row->slot, row->seen, &m)) {
-            verdict = plr_gate_judge(f, &m);
+            verdict = plr_gate_judge(f, opens, &m);
             plr_measurement_keep(&f->belief, &f->work, row->slot, &m);
         }
-        row->verdict =
-            (uint8_t)(verdict.accepted ? PLR_GATE_ACCEPTED : plr_gate_rejection(verdict.d2));
+        row->verdict = (uint8_t)(verdict.accepted ? PLR_GATE_ACCEPTED
+                                                  : plr_gate_rejection(left_out, verdict.d2));
         frame->of_slot[row->slot].d2 = verdict.d2;
         frame->of_slot[row->slot].det_S = verdict.det_S;
     }
@@ -147,8 +148,10 @@ static plr_search_decision ask_after_search(plr_filter *f, const plr_sightings *
 
 /* Finds the motion, judges the observations by it, and corrects. A frame that needs no motion applied, or
  * that waits for the next one, leaves it accumulating. */
-static plr_correction motion_first(plr_filter *f, plr_sightings *frame,
-                                   plr_search_decision *decision, plr_report *report) {
+static plr_correction motion_first(plr_filter *f, plr_sightings *frame, plr_decisions *decided,
+                                   plr_report *report) {
+    plr_search_decision *decision = &decided->search;
+    const plr_real weight = decided->picture.weight;
     plr_motion_first first;
     plr_considered_bias before;
     plr_correction correction = {.status = PLR_OK};
@@ -156,7 +159,7 @@ static plr_correction motion_first(plr_filter *f, plr_sightings *frame,
     plr_evidence_pose by_odometry;
     plr_motion_prior(&f->belief, &f->motion, &f->work.noise, 1, &stated);
     plr_evidence_note_pose(f, &by_odometry);
-    plr_motion_find(f, frame, &first);
+    plr_motion_find(f, frame, &decided->picture, &first);
     *decision = ask_after_search(f, frame, first.outright);
     if (decision->wait)
         return correction;
@@ -168,7 +171,7 @@ static plr_correction motion_first(plr_filter *f, plr_sightings *frame,
     if (first.outright)
         plr_motion_open_velocity(&f->belief, &f->motion);
     else
-        plr_motion_widen_velocity(&f->belief, &f->motion, plr_supervise_weight(&f->supervisor));
+        plr_motion_widen_velocity(&f->belief, &f->motion, weight);
     correction.status = plr_predict_apply(f, &first.motion);
     if (correction.status != PLR_OK)
         return correction;
@@ -179,30 +182,30 @@ static plr_correction motion_first(plr_filter *f, plr_sightings *frame,
         return correction;
     plr_bias_restore(f, &before);
     if (correction.moved)
-        plr_evidence_of_motion(f, &by_odometry, &stated, &first, &correction);
+        plr_evidence_of_motion(f, &by_odometry, &stated, weight, &first, &correction);
     return correction;
 }
 
 /* The motion is known exactly, or is not searched for: predict, gate, correct. */
-static plr_correction motion_as_given(plr_filter *f, plr_sightings *frame,
-                                      plr_search_decision *decision, plr_report *report) {
+static plr_correction motion_as_given(plr_filter *f, plr_sightings *frame, plr_decisions *decided,
+                                      plr_report *report) {
     const plr_correction failed = {.status = plr_predict_apply_pending(f)};
     if (failed.status != PLR_OK)
         return failed;
-    gate_each(f, frame);
-    *decision = ask_after_search(f, frame, false);
+    gate_each(f, frame, decided->picture.opens_fixed_gate);
+    decided->search = ask_after_search(f, frame, false);
     choose(f, frame, report);
     return plr_correct(f, frame, NULL, 0);
 }
 
 /* Corrects by the observations, and fills the report with how. */
-static plr_status correct(plr_filter *f, plr_sightings *frame, plr_search_decision *decision,
+static plr_status correct(plr_filter *f, plr_sightings *frame, plr_decisions *decided,
                           plr_report *report) {
     const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY;
     plr_evidence_pose before;
     const bool sees_map = plr_evidence_before_map(f, frame, &before);
-    const plr_correction correction = finds ? motion_first(f, frame, decision, report)
-                                            : motion_as_given(f, frame, decision, report);
+    const plr_correction correction = finds ? motion_first(f, frame, decided, report)
+                                            : motion_as_given(f, frame, decided, report);
     report->used = (uint16_t)correction.applied;
     report->blocks_failed = (uint16_t)correction.failed_batches;
     report->innovation_rows = (uint16_t)correction.innovation.rows;
@@ -218,18 +221,20 @@ static plr_status correct(plr_filter *f, plr_sightings *frame, plr_search_decisi
 
 /* Since the last frame the tracks have wandered off their points. */
 static void let_tracks_drift(plr_filter *f) {
-    if (f->supervisor.last_frame_ns == PLR_NEVER_NS || !(f->camera.track_drift_variance > 0))
+    const plr_time_ns last_ns = plr_supervise_last_frame_ns(&f->supervisor);
+    if (last_ns == PLR_NEVER_NS || !(f->camera.track_drift_variance > 0))
         return;
-    const plr_real seconds = plr_seconds(f->belief.t_ns - f->supervisor.last_frame_ns);
+    const plr_real seconds = plr_seconds(f->belief.t_ns - last_ns);
     plr_model_of(&f->belief)
         ->drift(&f->belief, &f->camera, PLR_SQRT(f->camera.track_drift_variance * seconds));
 }
 
 /* Known landmarks come in, at a pose that is found anew if need be. */
-static plr_status take_up_known(plr_filter *f, plr_sightings *frame, plr_frame_events *events,
+static plr_status take_up_known(plr_filter *f, plr_sightings *frame, plr_picture_decision *decided,
                                 plr_report *report) {
+    plr_frame_events *events = &f->evidence.events;
     plr_relocation found;
-    events->relocated = events->left_out = plr_relocate_when_lost(f, frame, events);
+    events->relocated = events->left_out = plr_relocate_when_lost(f, frame, events, decided);
     if (events->relocated) {
         report->created = (uint16_t)f->belief.count;
         plr_match_slots(f, frame);
@@ -322,16 +327,15 @@ static void recover(plr_filter *f, plr_sightings *frame, plr_report *report) {
 
 /* The stages up to the births; the first that fails ends them. */
 static plr_status estimate(plr_filter *f, plr_sightings *frame, plr_report *report) {
-    plr_search_decision decision = {false, false, false, false};
+    plr_decisions decided = {.picture =
+                                 plr_supervise_picture(&f->supervisor, &f->evidence.picture)};
     plr_status status = PLR_OK;
-    const bool frozen = f->config.model == PLR_MODEL_BODY &&
-                        !plr_supervise_picture(&f->supervisor, &f->evidence.picture);
-    if (!frozen)
-        status = take_up_known(f, frame, &f->evidence.events, report);
+    if (decided.picture.use)
+        status = take_up_known(f, frame, &decided.picture, report);
     if (status != PLR_OK)
         return status;
     let_tracks_drift(f);
-    if (frozen) { /* it does not show the present */
+    if (!decided.picture.use) {
         plr_match_count(f, frame);
         frame->count = 0;
     }
@@ -343,11 +347,11 @@ static plr_status estimate(plr_filter *f, plr_sightings *frame, plr_report *repo
     const bool is_state = plr_process_of(&f->source)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
-    status = correct(f, frame, &decision, report);
+    status = correct(f, frame, &decided, report);
     if (status != PLR_OK)
         return status;
     plr_match_count(f, frame);
-    status = renew_landmarks(f, frame, &decision, report);
+    status = renew_landmarks(f, frame, &decided.search, report);
     if (status == PLR_OK && stands && is_state)
         (void)plr_measure_twist(f, &still, &unused);
     return status;
@@ -373,7 +377,7 @@ static void wait_for_start(plr_filter *f, const plr_frame *given, plr_report *re
 }
 
 /* Checks the frame's time and the mode. */
-static plr_status check(const plr_filter *f, const plr_frame *frame) {
+static plr_status check_frame(const plr_filter *f, const plr_frame *frame) {
     if (frame->count > PLR_MAX_OBSERVATIONS || (frame->count > 0 && !frame->observations))
         return PLR_E_ARGUMENT;
     if (f->config.mode == PLR_MODE_MAPPING)
@@ -447,7 +451,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     r->status = plr_guard_check_whole(f);
     if (r->status != PLR_OK)
         return refuse_damaged(f, r);
-    r->status = check(f, frame);
+    r->status = check_frame(f, frame);
     if (r->status != PLR_OK) {
         f->totals.frames_refused++;
         (void)plr_filter_refuse(f, r->status);
@@ -469,7 +473,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         const plr_readings_evidence now = plr_filter_readings_at(f, f->belief.t_ns);
         plr_supervise_dead_reckons(&f->supervisor, &now);
     }
-    if (!(f->supervisor.reasons & PLR_REASON_NO_TWISTS) &&
+    if (plr_supervise_has_readings(&f->supervisor) &&
         f->source.inertial.fault >= PLR_IMU_FAULT_SATURATED)
         f->source.inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
     r->active = (uint16_t)f->belief.count;

@@ -14,7 +14,7 @@ enum {
 };
 
 /* An observation agrees with a pose below this: chi-square, 4 degrees of freedom, once in 2000. */
-#define AGREES_BELOW PLR_R(20)
+#define KNOWN_AGREES_BELOW PLR_R(20)
 /* Three points fix a pose well enough to begin with if their disparities are two of their
  * sigmas, and if the triangle is as high as a tenth of the longer of two of its sides. */
 #define DISPARITY_SIGMAS PLR_R(2)
@@ -79,7 +79,7 @@ static unsigned mark_agreeing(const plr_sights *s, const plr_placing *at) {
         plr_real e[3];
         plr_seen_known *known = &s->seen[i];
         known->agrees =
-            look(s, known, at, e, NULL) && plr_dot3(e, e) + known->gap_d2 < AGREES_BELOW;
+            look(s, known, at, e, NULL) && plr_dot3(e, e) + known->gap_d2 < KNOWN_AGREES_BELOW;
         agreeing += known->agrees;
     }
     return agreeing;

@@ -3,47 +3,27 @@
 
 #include <string.h>
 
+#include "limits/limits.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "process/imu_phase.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 
 /* At rest this much is averaged, and after so long without rest the body counts as moving. */
-#define REST_NS   UINT64_C(1000000000)
-#define MOVING_NS UINT64_C(3000000000)
+#define STRETCH_NS UINT64_C(1000000000)
+#define MOVING_NS  UINT64_C(3000000000)
 /* A start in motion takes gravity from this much. */
 #define GLANCE_NS UINT64_C(100000000)
 /* After a longer pause between readings the average begins anew: few readings are no mean. */
 #define PAUSE_NS UINT64_C(100000000)
-/* At rest the readings spread about their mean by no more than this, besides their noise, and the
- * means of both halves agree to a part of it: an engine may run, no hand may walk. */
-#define SPREAD_ACCEL PLR_R(0.5)  /* m/s^2 */
-#define SPREAD_GYRO  PLR_R(0.05) /* rad/s */
-#define DRIFT_SHARE  PLR_R(0.2)
-/* A gyro at rest that shows more than so many sigmas of its bias, and this, is turning. */
-#define BIAS_SIGMAS PLR_R(5)
-#define SLOW_TURN   PLR_R(0.02) /* rad/s */
-/* Where the pictures show that it stands, any rate below this is its bias, rad/s: data sheets have up to 20
- * degrees a second. */
-#define MOST_BIAS PLR_R(0.5)
 /* What is known of velocity at rest, m/s: by readings that are calm, and by pictures that stand, which a body
  * that hovers hardly moves either; and of tilt at a start in motion, rad. */
 #define REST_VELOCITY PLR_R(0.01)
 #define SEEN_VELOCITY PLR_R(0.1)
 #define TILT          PLR_R(0.2)
-/* Nothing is known better, as a variance: rad^2, m^2. */
-#define LEAST PLR_R(1e-8)
-/* A mean reading differs so much from gravity, m/s^2, that its units or the sensor are wrong. */
-#define NOT_GRAVITY PLR_R(1.5)
-/* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
-#define OTHER_TILT PLR_R(0.06)
-/* So long after the start the mean reading is held against gravity. It is at fault if it does not
- * fit in so many frames in a row, for so long: bodies swing, and frames come at any rate; and no more if it
- * fits for as long, for it was a shock. A body that spins faster, rad/s, would be thrown about. */
-#define WATCH_NS UINT64_C(10000000000)
-#define DOUBT_NS UINT64_C(850000000)
-#define SPINS    PLR_R(10)
-enum { WATCH_FRAMES = 5 };
+/* The variance of a tilt is no smaller, rad^2. */
+#define VARIANCE_FLOOR PLR_R(1e-8)
 /* The anchor comes this much after a start in motion, if this many frames were used. */
 #define ANCHOR_NS UINT64_C(2000000000)
 enum { ANCHOR_FRAMES = 10 };
@@ -62,7 +42,7 @@ void plr_alignment_restart(plr_source *source) {
     source->alignment.seen_to_move = before.seen_to_move;
 }
 
-/* What is being averaged ends at a pause, and altogether where the clock became another. */
+/* Restarts the average after a pause between readings; clears all of it if the clock was set. */
 static void end_stretch(plr_source *source, plr_time_ns t_ns) {
     if (!source->reading_valid)
         memset(&source->alignment, 0, sizeof source->alignment);
@@ -71,7 +51,7 @@ static void end_stretch(plr_source *source, plr_time_ns t_ns) {
 }
 
 bool plr_alignment_is_early(const plr_alignment *at, plr_time_ns t_ns) {
-    return at->count == 0 || 2 * (t_ns - at->begin_ns) <= REST_NS;
+    return at->count == 0 || 2 * (t_ns - at->begin_ns) <= STRETCH_NS;
 }
 
 /* Mean and spread of the readings so far (Welford). */
@@ -100,20 +80,23 @@ static plr_real variance_of(const plr_alignment *at, unsigned first, plr_real st
 
 /* True if the mean of three numbers is the same in the whole and in its first half, but for `allowed` and the
  * noise, `variance` of one reading. */
-static bool is_even(const plr_alignment *at, unsigned first, plr_real allowed, plr_real variance) {
+static bool is_even(const plr_source *source, unsigned first, plr_real allowed, plr_real variance) {
+    const plr_alignment *at = &source->alignment;
+    const plr_real share = plr_limit(source->left_out, PLR_LIMIT_DRIFT_SHARE);
     plr_real drift[3];
     for (unsigned i = 0; i < 3; i++)
         drift[i] = at->mean[first + i] - at->half_mean[first + i];
     const plr_real most =
-        DRIFT_SHARE * DRIFT_SHARE * allowed * allowed + PLR_R(36) * variance / (plr_real)at->count;
+        share * share * allowed * allowed + PLR_R(36) * variance / (plr_real)at->count;
     return plr_dot3(drift, drift) <= most;
 }
 
 /* True if three numbers scatter no more than a body's at rest; `noise`: variance of one reading. */
-static bool is_steady(const plr_alignment *at, unsigned first, plr_real allowed, plr_real noise) {
+static bool is_steady(const plr_source *source, unsigned first, plr_real allowed, plr_real noise) {
+    const plr_alignment *at = &source->alignment;
     const plr_real limit = allowed * allowed + PLR_R(4) * noise;
     return at->spread2[first / 3] <= PLR_R(3) * limit * (plr_real)at->count &&
-           is_even(at, first, allowed, noise);
+           is_even(source, first, allowed, noise);
 }
 
 /* True if most of the points that were seen in the first half of the stretch are still where they were. */
@@ -130,30 +113,36 @@ static bool pictures_stand(const plr_alignment *at) {
 }
 
 /* True if the readings say by themselves that the body rests: an engine may run, no hand may walk. */
-static bool is_calm(const plr_source *source, const plr_alignment *at, plr_real interval) {
-    return is_steady(at, 0, SPREAD_ACCEL, source->accel_density / interval) &&
-           is_steady(at, 3, SPREAD_GYRO, source->gyro_density / interval);
+static bool is_calm(const plr_source *source, plr_real interval) {
+    return is_steady(source, 0, plr_limit(source->left_out, PLR_LIMIT_SPREAD_ACCEL),
+                     source->accel_density / interval) &&
+           is_steady(source, 3, plr_limit(source->left_out, PLR_LIMIT_SPREAD_GYRO),
+                     source->gyro_density / interval);
 }
 
 /* Whether the body rests, and what speaks against it: MOVES, or a gyro that turns meanwhile. Calm readings say
  * it alone. Motors that idle shake them more than a hand does: then it takes the pictures, and means that do
  * not wander. */
-static plr_imu_fault find_unrest(const plr_source *source, const plr_alignment *at,
-                                 plr_real interval) {
+static plr_imu_fault find_unrest(const plr_source *source, plr_real interval) {
+    const plr_alignment *at = &source->alignment;
+    const uint64_t left_out = source->left_out;
+    const plr_real spread[2] = {plr_limit(left_out, PLR_LIMIT_SPREAD_ACCEL),
+                                plr_limit(left_out, PLR_LIMIT_SPREAD_GYRO)};
+    const plr_real most_bias = plr_limit(left_out, PLR_LIMIT_MOST_BIAS);
     const plr_real noise[2] = {source->accel_density / interval, source->gyro_density / interval};
-    const plr_real turn = BIAS_SIGMAS * source->bias_prior_sigma[3] + SLOW_TURN;
-    const bool still = is_steady(at, 0, SPREAD_ACCEL, noise[0]), seen = pictures_stand(at);
+    const plr_real turn = plr_limit(left_out, PLR_LIMIT_TURN_SIGMAS) * source->bias_prior_sigma[3] +
+                          plr_limit(left_out, PLR_LIMIT_SLOW_TURN);
+    const bool still = is_steady(source, 0, spread[0], noise[0]), seen = pictures_stand(at);
     plr_real rate[3];
     for (unsigned i = 0; i < 3; i++)
         rate[i] = at->mean[3 + i] - source->bias_prior[3 + i];
     const plr_real rate2 = plr_dot3(rate, rate);
-    const bool is_bias = rate2 <= turn * turn || (seen && rate2 <= MOST_BIAS * MOST_BIAS);
+    const bool is_bias = rate2 <= turn * turn || (seen && rate2 <= most_bias * most_bias);
     if (!is_bias)
         return still || seen ? PLR_IMU_FAULT_TURNS : PLR_IMU_FAULT_MOVES;
-    const bool even = is_even(at, 0, SPREAD_ACCEL, variance_of(at, 0, noise[0])) &&
-                      is_even(at, 3, SPREAD_GYRO, variance_of(at, 3, noise[1]));
-    return is_calm(source, at, interval) || (seen && even) ? PLR_IMU_FAULT_NONE
-                                                           : PLR_IMU_FAULT_MOVES;
+    const bool even = is_even(source, 0, spread[0], variance_of(at, 0, noise[0])) &&
+                      is_even(source, 3, spread[1], variance_of(at, 3, noise[1]));
+    return is_calm(source, interval) || (seen && even) ? PLR_IMU_FAULT_NONE : PLR_IMU_FAULT_MOVES;
 }
 
 /* ---------------------------------------------------------------- the start */
@@ -198,7 +187,8 @@ static void set_tilt_covariance(plr_belief *belief, const plr_real u[3], const p
         for (unsigned j = 0; j < 3; j++) {
             P_xi[PLR_POSE_DIM * i + j] = (double)P[PLR_POSE_DIM * i + j];
             P_xi[PLR_POSE_DIM * (3 + i) + 3 + j] =
-                (double)(theta[3 * i + j] + heading * u[i] * u[j] + (i == j ? LEAST : PLR_R(0)));
+                (double)(theta[3 * i + j] + heading * u[i] * u[j] +
+                         (i == j ? VARIANCE_FLOOR : PLR_R(0)));
         }
     plr_covariance_begin(belief, PLR_BLOCK_POSE, P_xi);
 }
@@ -218,9 +208,9 @@ static void set_unknown_velocity(plr_belief *belief, plr_real variance) {
     set_velocity(belief, none, same);
 }
 
-static void begin(plr_source *source, plr_time_ns t_ns, plr_real interval) {
+static void begin(plr_source *source, plr_imu_trigger how, plr_time_ns t_ns, plr_real interval) {
     plr_inertial *s = &source->inertial;
-    s->started = 1;
+    plr_imu_phase_change(s, how);
     s->started_ns = s->still_ns = t_ns;
     source->bias_walked_s = 0; /* the biases begin with their prior's variances */
     s->usual_s = interval;
@@ -249,16 +239,18 @@ typedef struct gravity_limits {
 
 /* What speaks against this mean specific force, if anything; in_pose: its direction tells. */
 static plr_imu_fault find_fault(const plr_belief *belief, const plr_source *source,
-                                const plr_real u[3], plr_real length, const gravity_limits *due,
+                                const plr_real u[3], plr_real length, const gravity_limits *fits,
                                 bool in_pose) {
+    const uint64_t left_out = source->left_out;
     const plr_real g = source->gravity, up = plr_dot3(u, belief->R_WB + 6);
-    if (length < PLR_R(0.3) * g && length > PLR_R(0.05) * g)
+    if (length < plr_limit(left_out, PLR_LIMIT_IN_G_BELOW) * g &&
+        length > plr_limit(left_out, PLR_LIMIT_FALLS_BELOW) * g)
         return PLR_IMU_FAULT_IN_G;
-    if (length < due->least || length > due->most)
+    if (length < fits->least || length > fits->most)
         return PLR_IMU_FAULT_NOT_GRAVITY;
-    if (in_pose && up < PLR_R(-0.7))
+    if (in_pose && up < plr_limit(left_out, PLR_LIMIT_UPSIDE_DOWN))
         return PLR_IMU_FAULT_UPSIDE_DOWN;
-    return in_pose && up < due->least_up ? PLR_IMU_FAULT_TILT : PLR_IMU_FAULT_NONE;
+    return in_pose && up < fits->least_up ? PLR_IMU_FAULT_TILT : PLR_IMU_FAULT_NONE;
 }
 
 /* At rest: the mean rate is the gyro's bias, and the mean specific force points up, but for the
@@ -268,10 +260,11 @@ static void start_at_rest(plr_belief *belief, plr_source *source, plr_time_ns t_
     enum { A = 0, G = 3 };
     const plr_alignment *at = &source->alignment;
     const plr_real readings = (plr_real)at->count, g2 = source->gravity * source->gravity;
-    const bool calm = is_calm(source, at, interval); /* else the pictures have said that it rests */
+    const plr_real slow_turn = plr_limit(source->left_out, PLR_LIMIT_SLOW_TURN);
+    const bool calm = is_calm(source, interval); /* else the pictures have said that it rests */
     const plr_real speed = calm ? REST_VELOCITY : SEEN_VELOCITY;
     const plr_real measured = variance_of(at, 3, source->gyro_density / interval) / readings +
-                              (calm ? PLR_R(0) : SLOW_TURN * SLOW_TURN);
+                              (calm ? PLR_R(0) : slow_turn * slow_turn);
     const plr_real flicker = variance_of(at, 0, source->accel_density / interval) / (readings * g2);
     plr_real L[9], theta[9], cross[PLR_POSE_DIM * PLR_BIAS_DIM] = {0};
     double variance[PLR_BIAS_DIM];
@@ -301,8 +294,7 @@ static void start_at_rest(plr_belief *belief, plr_source *source, plr_time_ns t_
     set_unknown_velocity(belief, speed * speed);
     set_tilt_covariance(belief, u, theta);
     plr_covariance_set(belief, PLR_BLOCK_BIAS, PLR_BLOCK_POSE, cross);
-    begin(source, t_ns, interval);
-    source->inertial.anchored = PLR_ANCHORED;
+    begin(source, PLR_IMU_STARTS_AT_REST, t_ns, interval);
 }
 
 /* In motion: the tilt from a moment's mean, with a velocity that the first frames will find. */
@@ -313,14 +305,13 @@ static void start_in_motion(plr_belief *belief, plr_source *source, plr_time_ns 
     tilt(belief, u);
     set_unknown_velocity(belief, source->start_velocity_variance);
     set_tilt_covariance(belief, u, theta);
-    begin(source, t_ns, interval);
+    begin(source, PLR_IMU_STARTS_MOVING, t_ns, interval);
 }
 
 void plr_alignment_given(plr_belief *belief, plr_source *source, const plr_real v[PLR_VELOCITY_DIM],
                          const plr_real variance[PLR_VELOCITY_DIM]) {
     set_velocity(belief, v, variance);
-    begin(source, belief->t_ns, 0);
-    source->inertial.anchored = PLR_ANCHORED;
+    begin(source, PLR_IMU_STARTS_AS_TOLD, belief->t_ns, 0);
 }
 
 void plr_alignment_does_not_stand(plr_source *source, plr_imu_fault how) {
@@ -335,13 +326,15 @@ static bool try_to_start(plr_belief *belief, plr_source *source, plr_time_ns t_n
     const plr_real interval =
         (plr_real)((double)(t_ns - at->begin_ns) * 1e-9 / (double)(at->count - 1));
     const plr_real length = measured_up(belief, at->mean, u);
-    const plr_imu_fault unrest = at_rest ? find_unrest(source, at, interval) : PLR_IMU_FAULT_NONE;
+    const plr_imu_fault unrest = at_rest ? find_unrest(source, interval) : PLR_IMU_FAULT_NONE;
     if (unrest != PLR_IMU_FAULT_NONE) {
         plr_alignment_does_not_stand(source, unrest);
         return false;
     }
     const plr_real g = source->gravity;
-    const gravity_limits resting = {g - NOT_GRAVITY, g + NOT_GRAVITY, PLR_R(1) - OTHER_TILT};
+    const plr_real off = plr_limit(source->left_out, PLR_LIMIT_NOT_GRAVITY);
+    const plr_real other_tilt = plr_limit(source->left_out, PLR_LIMIT_OTHER_TILT);
+    const gravity_limits resting = {g - off, g + off, PLR_R(1) - other_tilt};
     const gravity_limits moving = {0, ANY_LENGTH, ANY_TILT};
     source->inertial.fault = (uint8_t)find_fault(
         belief, source, u, length, at_rest ? &resting : &moving, source->inertial.pose_given);
@@ -355,75 +348,97 @@ static bool try_to_start(plr_belief *belief, plr_source *source, plr_time_ns t_n
     return true;
 }
 
+/* What may start it, by the setting `imu-start`. Where both may, motion waits until a rest has not come. */
+typedef struct start_way {
+    bool at_rest, in_motion;
+    bool as_told; /* by the pose that was set, whatever the readings say */
+} start_way;
+
+static const start_way ways[] = {
+    [PLR_IMU_START_AUTO] = {.at_rest = true, .in_motion = true},
+    [PLR_IMU_START_REST] = {.at_rest = true},
+    [PLR_IMU_START_MOTION] = {.in_motion = true},
+    [PLR_IMU_START_GIVEN] = {.as_told = true},
+};
+
 void plr_alignment_add(plr_belief *belief, plr_source *source, const plr_config *config,
                        plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
-    const plr_imu_start kind = (plr_imu_start)config->imu_start;
+    const start_way *way = &ways[config->imu_start];
     plr_alignment *at = &source->alignment;
-    if (kind == PLR_IMU_START_GIVEN) {
-        if (!source->inertial.pose_given)
-            return;
-        set_unknown_velocity(belief, source->start_velocity_variance);
-        begin(source, t_ns, 0);
+    if (way->as_told) {
+        if (source->inertial.pose_given) {
+            set_unknown_velocity(belief, source->start_velocity_variance);
+            begin(source, PLR_IMU_STARTS_MOVING, t_ns, 0);
+        }
         return;
     }
     end_stretch(source, t_ns);
     average(at, t_ns, reading);
     const plr_time_ns stretch = t_ns - at->begin_ns;
-    const plr_time_ns wait = at->seen_to_move ? REST_NS : MOVING_NS;
-    const bool may_move =
-        kind == PLR_IMU_START_MOTION || (kind == PLR_IMU_START_AUTO && t_ns - at->first_ns >= wait);
+    const plr_time_ns wait = at->seen_to_move ? STRETCH_NS : MOVING_NS;
+    const bool may_move = way->in_motion && (!way->at_rest || t_ns - at->first_ns >= wait);
     bool started = false;
-    if (stretch >= REST_NS && kind != PLR_IMU_START_MOTION)
+    if (stretch >= STRETCH_NS && way->at_rest)
         started = try_to_start(belief, source, t_ns, true);
     const bool doubtful =
         source->inertial.fault == PLR_IMU_FAULT_TURNS; /* the gyro is wrong, or soon rests */
     if (!started && may_move && !doubtful && stretch >= GLANCE_NS && at->count > 1)
         started = try_to_start(belief, source, t_ns, false);
-    if (!started && stretch >= REST_NS)
+    if (!started && stretch >= STRETCH_NS)
         plr_alignment_restart(source);
 }
 
 /* What speaks against the readings' mean of half a second, whatever the body does meanwhile. */
 static plr_imu_fault find_doubt(const plr_belief *belief, const plr_source *source) {
+    const uint64_t left_out = source->left_out;
     const plr_real g = source->gravity, *rate = source->inertial.slow + 3;
+    const plr_real spins = plr_limit(left_out, PLR_LIMIT_SPINS);
     plr_real u[3];
     const plr_real length = measured_up(belief, source->inertial.slow, u);
-    const bool carried = length > PLR_R(0.7) * g && length < PLR_R(1.3) * g;
-    if (carried && plr_dot3(rate, rate) > SPINS * SPINS)
+    const bool carried = length > plr_limit(left_out, PLR_LIMIT_CARRIED_LEAST) * g &&
+                         length < plr_limit(left_out, PLR_LIMIT_CARRIED_MOST) * g;
+    if (carried && plr_dot3(rate, rate) > spins * spins)
         return PLR_IMU_FAULT_TURNS;
-    if (length <= PLR_R(0.05) * g) /* falls */
+    if (length <= plr_limit(left_out, PLR_LIMIT_FALLS_BELOW) * g)
         return PLR_IMU_FAULT_NONE;
-    const gravity_limits due = {PLR_R(0.6) * g, PLR_R(2.5) * g, carried ? PLR_R(0.5) : ANY_TILT};
-    return find_fault(belief, source, u, length, &due, true);
+    const gravity_limits fits = {plr_limit(left_out, PLR_LIMIT_DOUBT_LEAST) * g,
+                                 plr_limit(left_out, PLR_LIMIT_DOUBT_MOST) * g,
+                                 carried ? plr_limit(left_out, PLR_LIMIT_DOUBT_UP) : ANY_TILT};
+    return find_fault(belief, source, u, length, &fits, true);
 }
 
 void plr_alignment_watch_gravity(const plr_belief *belief, plr_source *source) {
+    const uint64_t left_out = source->left_out;
+    const unsigned frames = plr_limit_count(left_out, PLR_LIMIT_WATCH_FRAMES);
     plr_inertial *s = &source->inertial;
-    const bool watches = s->fault == PLR_IMU_FAULT_NONE && belief->t_ns - s->started_ns <= WATCH_NS;
+    const bool watches = s->fault == PLR_IMU_FAULT_NONE &&
+                         belief->t_ns - s->started_ns <= plr_limit_ns(left_out, PLR_LIMIT_WATCH_MS);
     const bool doubts = s->fault > PLR_IMU_FAULT_NONE && s->fault < PLR_IMU_FAULT_TILT;
-    if (!s->started || !(watches || doubts))
+    if (s->phase < PLR_IMU_UNSETTLED || !(watches || doubts))
         return;
     const plr_imu_fault doubt = find_doubt(belief, source);
     if ((doubt != PLR_IMU_FAULT_NONE) == doubts)
         s->doubts = 0; /* nothing new */
     else if (s->doubts++ == 0)
         s->doubted_ns = belief->t_ns;
-    if (s->doubts >= WATCH_FRAMES && belief->t_ns - s->doubted_ns >= DOUBT_NS) {
+    if (s->doubts >= frames &&
+        belief->t_ns - s->doubted_ns >= plr_limit_ns(left_out, PLR_LIMIT_DOUBT_MS)) {
         s->fault = (uint8_t)doubt;
         s->doubts = 0;
-    } else if (s->doubts > WATCH_FRAMES) {
-        s->doubts = WATCH_FRAMES; /* more are not counted */
+    } else if (s->doubts > frames) {
+        s->doubts = (uint8_t)frames; /* more are not counted */
     }
 }
 
 /* ---------------------------------------------------------------- the anchor */
 
 bool plr_alignment_is_unsettled(const plr_source *source) {
-    return source->inertial.started && source->inertial.anchored != PLR_ANCHORED;
+    return source->inertial.phase == PLR_IMU_UNSETTLED ||
+           source->inertial.phase == PLR_IMU_UNSETTLED_IN_WORLD;
 }
 
 void plr_alignment_follow_clock(const plr_belief *belief, plr_source *source, plr_time_ns t_ns) {
-    if (!source->inertial.started)
+    if (source->inertial.phase < PLR_IMU_UNSETTLED)
         return;
     source->inertial.started_ns +=
         t_ns - belief->t_ns; /* unsigned: a time before zero wraps, and back */
@@ -431,8 +446,8 @@ void plr_alignment_follow_clock(const plr_belief *belief, plr_source *source, pl
 }
 
 void plr_alignment_keep_world(plr_source *source) {
-    if (source->process == PLR_PROCESS_IMU && source->inertial.anchored == PLR_ANCHOR_DUE)
-        source->inertial.anchored = PLR_WORLD_IS_GIVEN;
+    if (source->process == PLR_PROCESS_IMU)
+        plr_imu_phase_change(&source->inertial, PLR_IMU_WORLD_GIVEN);
 }
 
 /* Adds variances of the position, in each direction, and of the yaw, about the vertical u. */
@@ -463,12 +478,12 @@ void plr_alignment_anchor(plr_belief *belief, const plr_motion *motion, plr_sour
     if (!plr_alignment_is_unsettled(source) || s->frames < ANCHOR_FRAMES ||
         belief->t_ns - s->started_ns < ANCHOR_NS || motion->pending)
         return;
-    if (s->anchored == PLR_WORLD_IS_GIVEN) {
+    if (s->phase == PLR_IMU_UNSETTLED_IN_WORLD) {
         const plr_real way2 = source->start_velocity_variance * (FOUND_S * FOUND_S);
         add_to_pose(belief, u, TILT * TILT * way2, TILT * TILT * (TILT * TILT));
     } else {
         forget_place(belief, u);
         add_to_pose(belief, u, variance, variance);
     }
-    source->inertial.anchored = PLR_ANCHORED;
+    plr_imu_phase_change(&source->inertial, PLR_IMU_ANCHORS);
 }

@@ -5,14 +5,14 @@
  * body axes: then a shift of the world, or a turn about the vertical, changes nothing but the pose,
  * and the filter learns nothing of either.
  */
-#include "process/process.h"
-
 #include <string.h>
 
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "process/imu_noise.h"
+#include "process/process.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
@@ -26,9 +26,9 @@
 #define STALE_S PLR_R(0.25)
 
 /* Rows in the core, and columns among the drivers (theta, v, b_a, b_g). */
-enum { THETA = 3, VEL = 6, ACCEL = 9, GYRO = 12, DIM = PLR_CORE_DIM, D = PLR_DRIVERS };
+enum { THETA = PLR_CORE_THETA, VEL = PLR_CORE_VEL, ACCEL = PLR_CORE_ACCEL, GYRO = PLR_CORE_GYRO };
+enum { DIM = PLR_CORE_DIM, MOVED = PLR_CORE_MOVED, D = PLR_DRIVERS };
 enum { D_THETA = 0, D_VEL = 3, D_ACCEL = 6, D_GYRO = 9 };
-enum { MOVED = 9 }; /* rows that a step changes: rho, theta, v */
 
 static void lay_out(plr_belief *belief, const plr_config *config) {
     (void)config;
@@ -122,11 +122,11 @@ static void put(plr_real *F, const plr_real block[9]) {
         memcpy(F + DIM * i, block + 3 * i, 3 * sizeof *block);
 }
 
-/* The rows of F for rho, theta, v, 9 x 15: x+ = F x. Those of the biases are the identity. */
+/* The rows of F for rho, theta, v, 9 x 15: x+ = F x. Those of the biases are the identity. What is always zero,
+ * all of theta but its own columns and the gyro's, and the columns of rho in v, is not filled. */
 static void transition(const plr_imu_step *s, plr_real F[MOVED * DIM]) {
     plr_real block[9], skew[9], forward[9], tau = s->tau;
     plr_real *rho = F, *theta = F + THETA * DIM, *vel = F + VEL * DIM;
-    memset(theta, 0, 3 * DIM * sizeof *F); /* the columns of rho in the rows of v are not read */
     put(rho, s->Et);
     put(theta + THETA, s->Et);
     put(vel + VEL, s->Et);
@@ -152,99 +152,72 @@ static void transition(const plr_imu_step *s, plr_real F[MOVED * DIM]) {
         plr_gemm_nn(1, 3, 3, skew + 3 * i, 3, theta + GYRO, DIM, vel + DIM * i + GYRO, DIM);
 }
 
-/* The derivatives of the whole motion by the drivers: B of its error n, V of the velocity. */
+/* A column of the derivatives before a step, in axes before it: of the error n its way, and the velocity's. */
+typedef struct plr_imu_column {
+    plr_real way[3], speed[3];
+} plr_imu_column;
+
+static inline void get_column(plr_imu_column *at, const plr_motion *motion, unsigned c) {
+    for (unsigned i = 0; i < 3; i++) {
+        at->way[i] = motion->B[D * i + c];
+        at->speed[i] = motion->core.V[D * i + c];
+    }
+}
+
+/* The velocity goes on; a body that is turned by this takes gravity for a force. */
+static inline void move_column(plr_imu_column *at, const plr_imu_step *s,
+                               const plr_real turned[3]) {
+    plr_real cross[3];
+    plr_cross3(cross, s->gamma, turned);
+    for (unsigned i = 0; i < 3; i++) {
+        const plr_real v = at->speed[i];
+        at->speed[i] = PLR_FMA(s->tau, cross[i], v);
+        at->way[i] = PLR_FMA(s->tau, PLR_FMA(PLR_R(0.5) * s->tau, cross[i], v), at->way[i]);
+    }
+}
+
+static inline void put_column(const plr_imu_column *at, const plr_imu_step *s, plr_motion *motion,
+                              unsigned c) {
+    for (unsigned i = 0; i < 3; i++) {
+        motion->B[D * i + c] = plr_dot3(s->Et + 3 * i, at->way);
+        motion->core.V[D * i + c] = plr_dot3(s->Et + 3 * i, at->speed);
+    }
+}
+
+/* The derivatives of the whole motion by the drivers: B of its error n, V of the velocity. Of n's turn that by the
+ * gyro's bias alone is not zero; and the body has been turned by its tilt at the beginning and by that. */
 static void accumulate_derivatives(plr_motion *motion, const plr_imu_step *s,
                                    const plr_real F[MOVED * DIM]) {
-    plr_real *B = motion->B, *V = motion->core.V, tau = s->tau;
-    plr_real theta[3 * D] = {0}, way[3 * D], speed[3 * D], cross[3];
-    for (unsigned i = 0; i < 3; i++) { /* theta now by the drivers: R_D^T theta + B_theta */
-        memcpy(theta + D * i, B + D * (THETA + i), D * sizeof *B);
-        for (unsigned j = 0; j < 3; j++)
-            theta[D * i + D_THETA + j] += motion->E[3 * j + i] + (i == j ? PLR_R(1) : PLR_R(0));
-    }
-    for (unsigned c = 0; c < D; c++) {
-        const plr_real turned[3] = {theta[c], theta[D + c], theta[2 * D + c]};
-        const plr_real error[3] = {B[THETA * D + c], B[(THETA + 1) * D + c],
-                                   B[(THETA + 2) * D + c]};
-        plr_cross3(cross, s->gamma, turned);
-        for (unsigned i = 0; i < 3; i++) {
-            const plr_real v = V[D * i + c];
-            speed[D * i + c] = PLR_FMA(tau, cross[i], v);
-            way[D * i + c] = PLR_FMA(tau, PLR_FMA(PLR_R(0.5) * tau, cross[i], v), B[D * i + c]);
-        }
-        plr_cross3(cross, s->d, error);
+    plr_real *B = motion->B, *V = motion->core.V, *turn = B + D * THETA + D_GYRO, cross[3];
+    plr_imu_column at;
+    for (unsigned c = D_VEL; c < D_GYRO; c++) {
+        get_column(&at, motion, c);
         for (unsigned i = 0; i < 3; i++)
-            way[D * i + c] -= cross[i];
+            at.way[i] = PLR_FMA(s->tau, at.speed[i], at.way[i]);
+        put_column(&at, s, motion, c);
     }
-    memcpy(theta, B + THETA * D, sizeof theta);
-    turn_back(D, s->Et, 1, way, D, B, D);
-    turn_back(D, s->Et, 1, theta, D, B + THETA * D, D);
-    turn_back(D, s->Et, 1, speed, D, V, D);
+    for (unsigned c = 0; c < 3; c++) {
+        const plr_real turned[3] = {turn[c], turn[D + c], turn[2 * D + c]};
+        plr_real tilted[3];
+        for (unsigned i = 0; i < 3; i++) /* R_D^T */
+            tilted[i] = motion->E[3 * c + i] + (i == c ? PLR_R(1) : PLR_R(0));
+        get_column(&at, motion, D_THETA + c);
+        move_column(&at, s, tilted);
+        put_column(&at, s, motion, D_THETA + c);
+        get_column(&at, motion, D_GYRO + c);
+        move_column(&at, s, turned);
+        plr_cross3(cross, s->d, turned);
+        for (unsigned i = 0; i < 3; i++) {
+            at.way[i] -= cross[i];
+            turn[D * i + c] = plr_dot3(s->Et + 3 * i, turned) + F[DIM * (THETA + i) + GYRO + c];
+        }
+        put_column(&at, s, motion, D_GYRO + c);
+    }
     for (unsigned i = 0; i < 3; i++)
         for (unsigned c = D_ACCEL; c < D; c++) {
             B[D * i + c] += F[DIM * i + THETA + c];
-            B[D * (THETA + i) + c] += F[DIM * (THETA + i) + THETA + c];
             V[D * i + c] += F[DIM * (VEL + i) + THETA + c];
         }
-}
-
-/* The covariance of the motion's noise: of n, velocity and biases together, 15 x 15. */
-static void get_noise(const plr_motion *motion, plr_real Q[DIM * DIM]) {
-    const plr_core_motion *m = &motion->core;
-    for (unsigned i = 0; i < VEL; i++) {
-        memcpy(Q + DIM * i, motion->Q + PLR_POSE_DIM * i, PLR_POSE_DIM * sizeof *Q);
-        memcpy(Q + DIM * i + VEL, m->Q_nc + PLR_REST_DIM * i, PLR_REST_DIM * sizeof *Q);
-    }
-    for (unsigned i = 0; i < PLR_REST_DIM; i++) {
-        plr_real *row = Q + DIM * (VEL + i);
-        memcpy(row + VEL, m->Q_cc + PLR_REST_DIM * i, PLR_REST_DIM * sizeof *Q);
-        for (unsigned j = 0; j < VEL; j++)
-            row[j] = m->Q_nc[PLR_REST_DIM * j + i];
-    }
-}
-
-static void put_noise(plr_motion *motion, const plr_real Q[DIM * DIM]) {
-    plr_core_motion *m = &motion->core;
-    for (unsigned i = 0; i < VEL; i++) {
-        memcpy(motion->Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
-        memcpy(m->Q_nc + PLR_REST_DIM * i, Q + DIM * i + VEL, PLR_REST_DIM * sizeof *Q);
-    }
-    for (unsigned i = 0; i < PLR_REST_DIM; i++)
-        memcpy(m->Q_cc + PLR_REST_DIM * i, Q + DIM * (VEL + i) + VEL, PLR_REST_DIM * sizeof *Q);
-}
-
-enum { STRIP = 5 }; /* columns that are computed side by side */
-
-/* The rows of rho, theta and v of F are zero but for these columns. */
-typedef struct plr_imu_rows {
-    uint8_t row, from, to, more; /* from .. to - 1, and from `more` to the end */
-} plr_imu_rows;
-
-static const plr_imu_rows of_rho = {0, 0, DIM, DIM};
-static const plr_imu_rows of_theta = {THETA, THETA, VEL, GYRO};
-static const plr_imu_rows of_v = {VEL, THETA, DIM, DIM};
-
-static inline unsigned next_column(const plr_imu_rows *rows, unsigned column) {
-    return column + 1 == rows->to ? rows->more : column + 1;
-}
-
-/* Three rows of X = F Q: a strip of the result stays in registers. */
-static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
-                           const plr_real *restrict Q, plr_real *restrict X) {
-    F += DIM * rows->row;
-    X += DIM * rows->row;
-    for (unsigned j = 0; j < DIM; j += STRIP) {
-        plr_real sum[3 * STRIP] = {0};
-        for (unsigned l = rows->from; l < DIM; l = next_column(rows, l)) {
-            const plr_real *q = Q + DIM * l + j;
-            for (unsigned i = 0; i < 3; i++)
-                for (unsigned c = 0; c < STRIP; c++)
-                    sum[STRIP * i + c] = PLR_FMA(F[DIM * i + l], q[c], sum[STRIP * i + c]);
-        }
-        for (unsigned i = 0; i < 3; i++)
-            for (unsigned c = 0; c < STRIP; c++)
-                X[DIM * i + j + c] = sum[STRIP * i + c];
-    }
 }
 
 /* The density of the accelerometer's (0) or the gyro's (1) noise, squared: as stated, or as the readings
@@ -291,47 +264,6 @@ static void densities(const plr_belief *belief, const plr_source *source,
     }
 }
 
-/* The 3x3 block of Q = X F^T between three rows of X and three of F, and its mirror image. */
-static inline void set_block(plr_real Q[DIM * DIM], const plr_real *X, const plr_real *F,
-                             const plr_imu_rows *left, const plr_imu_rows *right) {
-    plr_real block[9] = {0};
-    X += DIM * left->row;
-    F += DIM * right->row;
-    for (unsigned l = right->from; l < DIM; l = next_column(right, l))
-        for (unsigned i = 0; i < 3; i++)
-            for (unsigned j = 0; j < 3; j++)
-                block[3 * i + j] = PLR_FMA(X[DIM * i + l], F[DIM * j + l], block[3 * i + j]);
-    for (unsigned i = 0; i < 3; i++)
-        for (unsigned j = 0; j < (left == right ? i + 1 : 3); j++)
-            Q[DIM * (left->row + i) + right->row + j] = Q[DIM * (right->row + j) + left->row + i] =
-                block[3 * i + j];
-}
-
-/* Q <- F Q F^T + noise. The noise of the readings, of variances `reading` (accelerometer, gyro),
- * enters as an error of the biases does that lasts for this step alone. */
-static void transport_noise(plr_motion *motion, const plr_real F[MOVED * DIM],
-                            const plr_real reading[2]) {
-    plr_real Q[DIM * DIM], X[MOVED * DIM];
-    get_noise(motion, Q);
-    transport_rows(&of_rho, F, Q, X);
-    transport_rows(&of_theta, F, Q, X);
-    transport_rows(&of_v, F, Q, X);
-    for (unsigned i = 0; i < MOVED; i++)
-        for (unsigned c = ACCEL; c < DIM; c++) {
-            plr_real *x = &X[DIM * i + c];
-            Q[DIM * i + c] = Q[DIM * c + i] = *x;
-            *x = PLR_FMA(F[DIM * i + c], reading[c >= GYRO], *x);
-        }
-    /* of two, the one that is zero in more columns stands on the right */
-    set_block(Q, X, F, &of_rho, &of_rho);
-    set_block(Q, X, F, &of_rho, &of_theta);
-    set_block(Q, X, F, &of_rho, &of_v);
-    set_block(Q, X, F, &of_theta, &of_theta);
-    set_block(Q, X, F, &of_v, &of_theta);
-    set_block(Q, X, F, &of_v, &of_v);
-    put_noise(motion, Q);
-}
-
 static void move_noise(const plr_belief *belief, plr_motion *motion, const plr_source *source,
                        const plr_imu_step *s, const plr_real F[MOVED * DIM],
                        const plr_process_step *by) {
@@ -340,7 +272,7 @@ static void move_noise(const plr_belief *belief, plr_motion *motion, const plr_s
     densities(belief, source, by, s->gamma, reading);
     reading[0] /= tau;
     reading[1] /= tau;
-    transport_noise(motion, F, reading);
+    plr_imu_carry_noise(motion, F, reading);
     for (unsigned i = ACCEL - VEL; i < PLR_REST_DIM; i++) {
         plr_real *q = &motion->core.Q_cc[(PLR_REST_DIM + 1) * i];
         *q = PLR_FMA(i < GYRO - VEL ? source->accel_walk_variance : source->gyro_walk_variance, tau,
@@ -371,7 +303,7 @@ static void step(plr_belief *belief, plr_motion *motion, plr_source *source, plr
 
 static void mean(const plr_belief *belief, const plr_source *source, plr_time_ns t_ns,
                  const plr_real reading[PLR_READING_DIM], plr_process_step *step) {
-    const bool makes_up = plr_seconds(t_ns - source->reading_ns) <= BRIDGED_S;
+    const bool makes_up = step->interval <= BRIDGED_S;
     plr_mean_reading(belief, source, source->timing, makes_up, t_ns, reading, step);
 }
 

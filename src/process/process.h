@@ -39,7 +39,7 @@ typedef struct plr_process {
     void (*step)(plr_belief *belief, plr_motion *motion, plr_source *source, plr_time_ns t_ns,
                  const plr_process_step *step);
 
-    /* Fills `mean` and `whole` of the step that ends with `reading`: plr_mean_reading. */
+    /* Fills `mean` and `whole` of the step that ends with `reading`: plr_mean_reading. Its `interval` is known. */
     void (*mean)(const plr_belief *belief, const plr_source *source, plr_time_ns t_ns,
                  const plr_real reading[PLR_READING_DIM], plr_process_step *step);
 
@@ -102,7 +102,7 @@ extern const plr_process plr_process_imu;
 
 /* False until an IMU is aligned with gravity; until then the state rests, but for mapping. */
 static inline bool plr_process_has_started(const plr_source *source) {
-    return source->process != PLR_PROCESS_IMU || source->inertial.started != 0 ||
+    return source->process != PLR_PROCESS_IMU || source->inertial.phase >= PLR_IMU_UNSETTLED ||
            source->poses_are_given;
 }
 

@@ -100,7 +100,7 @@ static bool lost_readings(const plr_source *source, plr_real h) {
 
 static void mean(const plr_belief *belief, const plr_source *source, plr_time_ns t_ns,
                  const plr_real reading[PLR_READING_DIM], plr_process_step *step) {
-    const bool makes_up = !lost_readings(source, plr_seconds(t_ns - source->reading_ns));
+    const bool makes_up = !lost_readings(source, step->interval);
     plr_mean_reading(belief, source, source->timing, makes_up, t_ns, reading, step);
 }
 

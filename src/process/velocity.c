@@ -11,7 +11,7 @@
 #include "state/seconds.h"
 
 /* If the next reading does not come, the last one is held for so many of the sensor's intervals. */
-enum { HELD_INTERVALS = 2 };
+enum { HOLDS_INTERVALS = 2 };
 
 /* A velocity that was measured longer ago than this says too little about the present one. */
 #define LONGEST_INTERVAL_NS UINT64_C(500000000)
@@ -41,7 +41,7 @@ void plr_velocity_hold(const plr_belief *belief, plr_source *source, unsigned wh
     held->interval_ns = interval;
     held->known = source->velocities_known = 1;
     held->t_ns = belief->t_ns;
-    held->until_ns = belief->t_ns + HELD_INTERVALS * usual;
+    held->until_ns = belief->t_ns + HOLDS_INTERVALS * usual;
     memcpy(held->z, rows->z, sizeof held->z);
     memcpy(held->M, rows->M, sizeof held->M);
     for (unsigned r = 0; r < PLR_ROWS; r++)

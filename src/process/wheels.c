@@ -3,20 +3,14 @@
 
 #include <string.h>
 
+#include "limits/limits.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
 #include "state/calibration.h"
 #include "state/seconds.h"
 
-/* Encoders that count nothing for so long have moved less than a count. A wheel that has been silent for as
- * long begins anew. */
-#define REST_NS       UINT64_C(500000000)
+/* A standstill is told so often. */
 #define REST_EVERY_NS UINT64_C(100000000)
-/* One rejected reading is chance, this many in succession are not. */
-#define CONFIRMED UINT64_C(5)
-/* A slip is followed as it changes in so much time, s; and believed for so long. */
-#define SLIP_FOLLOWED_S PLR_R(0.2)
-#define SLIP_NS         UINT64_C(10000000000)
 
 static bool measures(const plr_reading *reading, unsigned axis) {
     return (reading->axes >> axis & 1) != 0;
@@ -36,8 +30,10 @@ static unsigned number_of(const plr_wheels *wheels, const plr_real at_B[3]) {
     return k;
 }
 
-static bool is_silent(const plr_wheels *wheels, unsigned k, plr_time_ns t_ns) {
-    return t_ns < wheels->t_ns[k] || t_ns - wheels->t_ns[k] > REST_NS;
+static bool is_silent(const plr_source *source, unsigned k, plr_time_ns t_ns) {
+    const plr_wheels *wheels = &source->wheels;
+    return t_ns < wheels->t_ns[k] ||
+           t_ns - wheels->t_ns[k] > plr_limit_ns(source->left_out, PLR_LIMIT_WHEEL_REST_MS);
 }
 
 void plr_wheels_note(plr_source *source, const plr_reading *reading) {
@@ -49,7 +45,7 @@ void plr_wheels_note(plr_source *source, const plr_reading *reading) {
     wheels->latest = (uint8_t)k;
     if (k == PLR_WHEELS)
         return;
-    bool moves = k == wheels->count || is_silent(wheels, k, reading->t_ns);
+    bool moves = k == wheels->count || is_silent(source, k, reading->t_ns);
     if (k == wheels->count) {
         memcpy(wheels->at_B + 3 * k, at_B, sizeof at_B);
         wheels->count++;
@@ -69,17 +65,20 @@ bool plr_wheels_hold(plr_source *source, const plr_real r[PLR_ROWS], bool passed
         return passed;
     const plr_time_ns now = wheels->t_ns[k], since = wheels->slip_ns[k];
     plr_real *slip = wheels->slip + 3 * k, off[3], next2 = 0;
+    const plr_time_ns readings = plr_limit_count(source->left_out, PLR_LIMIT_SLIP_READINGS);
+    const plr_time_ns longest = plr_limit_ns(source->left_out, PLR_LIMIT_SLIP_MS);
     const bool slips = since > 0 && since <= now;
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         off[i] = slips ? r[i] - slip[i] : r[i];
         next2 = PLR_FMA(off[i], off[i], next2);
     }
-    const bool confirmed = slips && now - since >= CONFIRMED * wheels->interval_ns[k];
-    if (passed && !(confirmed && now - since < SLIP_NS && plr_dot3(r, r) >= next2)) {
+    const bool confirmed = slips && now - since >= readings * wheels->interval_ns[k];
+    if (passed && !(confirmed && now - since < longest && plr_dot3(r, r) >= next2)) {
         wheels->slip_ns[k] = 0;
         return true;
     }
-    const plr_real share = plr_seconds(wheels->interval_ns[k]) / SLIP_FOLLOWED_S;
+    const plr_real share = plr_seconds(wheels->interval_ns[k]) /
+                           plr_seconds(plr_limit_ns(source->left_out, PLR_LIMIT_SLIP_FOLLOWED_MS));
     for (unsigned i = 0; i < PLR_ROWS; i++)
         slip[i] = slips && share < 1 ? PLR_FMA(share, off[i], slip[i]) : r[i];
     if (!slips)
@@ -91,9 +90,9 @@ bool plr_wheels_stand(plr_source *source, plr_time_ns t_ns) {
     plr_wheels *wheels = &source->wheels;
     unsigned stand = 0;
     for (unsigned k = 0; k < wheels->count; k++) {
-        if (is_silent(wheels, k, t_ns))
+        if (is_silent(source, k, t_ns))
             continue;
-        if (t_ns - wheels->moved_ns[k] < REST_NS)
+        if (t_ns - wheels->moved_ns[k] < plr_limit_ns(source->left_out, PLR_LIMIT_WHEEL_REST_MS))
             return false;
         stand++;
     }

@@ -138,6 +138,21 @@ void plr_codec_numbers(plr_codec *c, plr_field_kind kind, void *numbers, uint32_
         pass_number(c, &f, numbers ? (unsigned char *)numbers + i * size_in_memory(kind) : NULL);
 }
 
+void plr_codec_bytes(plr_codec *c, const uint8_t **bytes, unsigned n) {
+    if (c->direction == PLR_CODEC_WRITE) {
+        move(c, (uint8_t *)*bytes, n);
+        return;
+    }
+    PLR_ASSERT(c->direction == PLR_CODEC_CHECK || c->move == plr_codec_take);
+    require(c, c->direction == PLR_CODEC_CHECK ? *bytes != NULL : c->left >= n);
+    if (c->direction == PLR_CODEC_CHECK || c->status != PLR_OK)
+        return;
+    const uint8_t **next = c->context;
+    *bytes = *next;
+    *next += n;
+    c->left -= n;
+}
+
 /* A 3x3 matrix by its lower triangle, row by row. */
 static void pass_symmetric(plr_codec *c, unsigned char *at) {
     double A[9];

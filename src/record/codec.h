@@ -95,6 +95,9 @@ void plr_codec_fields(plr_codec *c, void *object, const plr_field *fields, unsig
 /* Passes `count` numbers, one behind the other, of one of the first kinds. */
 void plr_codec_numbers(plr_codec *c, plr_field_kind kind, void *numbers, uint32_t count);
 
+/* Passes n bytes as they are. READ: *bytes becomes where they lie, and `move` must be plr_codec_take. */
+void plr_codec_bytes(plr_codec *c, const uint8_t **bytes, unsigned n);
+
 /* Bytes of n fields of the first kinds. */
 uint32_t plr_codec_size(const plr_field *fields, unsigned n);
 

@@ -5,6 +5,11 @@
 
 #include <string.h>
 
+/* A pixel, as a row of its message. */
+typedef struct plr_grey {
+    uint8_t grey;
+} plr_grey;
+
 /* The fields of each message, and those of its rows. They are counted from the beginning of the
  * message's content, which all members of plr_message.as share. */
 #define MESSAGE(name, from, about) static const plr_field name##_fields[] = {
@@ -94,6 +99,13 @@ static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_
     pass_sigmas(c, m->count, rows);
 }
 
+/* What is not in the frame: both pictures are of one size, and HEADER has the virtual camera. */
+static void pass_rest_of_rig(plr_rig *rig) {
+    rig->right.width_px = rig->left.width_px;
+    rig->right.height_px = rig->left.height_px;
+    rig->fx_px = rig->fy_px = rig->cx_px = rig->cy_px = 0;
+}
+
 void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
                       const plr_observation_room *room) {
     if (kind == PLR_KIND_NONE || (unsigned)kind > PLR_WIRE_KINDS) {
@@ -117,6 +129,12 @@ void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
         pass_rows(c, m->count, m->rejected, sizeof *m->rejected, EVIDENCE_rows,
                   LENGTH(EVIDENCE_rows));
     }
+    if (kind == PLR_KIND_IMAGE) {
+        plr_image_message *m = content;
+        plr_codec_bytes(c, &m->pixels, m->count * plr_codec_size(IMAGE_rows, LENGTH(IMAGE_rows)));
+    }
+    if (kind == PLR_KIND_RIG && plr_codec_reads(c))
+        pass_rest_of_rig(content);
     if (kind == PLR_KIND_LANDMARK && plr_codec_reads(c)) {
         plr_landmark_message *m = content;
         m->landmark.times_gated = 0;

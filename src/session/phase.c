@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "session/phase.h"
 
+#include "math/arrows.h"
 #include "pelorus/assertions.h"
 
 /* The arrows of the drawing in docs/REPLAY-FORMAT.md, but for END, which leads back from all. */
-static const struct {
-    uint8_t from, trigger, to;
-} arrows[] = {
+static const plr_arrow arrows[] = {
     {PLR_PHASE_WAITING, PLR_TRIGGER_HEADER, PLR_PHASE_READY},
     {PLR_PHASE_READY, PLR_TRIGGER_REJECTED, PLR_PHASE_REJECTED},
     {PLR_PHASE_REJECTED, PLR_TRIGGER_HEADER, PLR_PHASE_READY},
@@ -20,13 +19,8 @@ static const struct {
 
 void plr_phase_change(plr_session_phase *phase, plr_phase_trigger trigger) {
     PLR_ASSERT(*phase < PLR_PHASES);
-    if (trigger == PLR_TRIGGER_END) {
-        *phase = PLR_PHASE_WAITING;
-        return;
-    }
-    for (unsigned i = 0; i < sizeof arrows / sizeof arrows[0]; i++)
-        if (arrows[i].from == *phase && arrows[i].trigger == trigger) {
-            *phase = (plr_session_phase)arrows[i].to;
-            return;
-        }
+    *phase = trigger == PLR_TRIGGER_END
+                 ? PLR_PHASE_WAITING
+                 : (plr_session_phase)plr_arrow_follow(arrows, sizeof arrows / sizeof *arrows,
+                                                       *phase, trigger);
 }

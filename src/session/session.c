@@ -5,15 +5,16 @@
 
 #include "pelorus/assertions.h"
 #include "record/messages.h"
-#include "session/budget.h"
 #include "session/events.h"
 #include "session/layers.h"
 #include "session/line.h"
+#include "session/look.h"
 #include "session/phase.h"
 #include "session/plausible.h"
 #include "session/saving.h"
 #include "session/send.h"
 #include "session/start.h"
+#include "session/use.h"
 
 void plr_session_options_default(plr_session_options *options) {
     memset(options, 0, sizeof *options);
@@ -105,6 +106,8 @@ static const struct {
     [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_twist},
     [PLR_KIND_IMU]      = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_imu},
     [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_stereo},
+    [PLR_KIND_IMAGE]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_look_take},
+    [PLR_KIND_RIG]      = {{EARLY,  USE,   USE,     SAME,    SAME,    SAME}, plr_look_take_rig},
     [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_events_take_truth},
     [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_reading},
     [PLR_KIND_STATE]    = {{EARLY,  EARLY, EARLY,   USE,     USE,     USE},  save},
@@ -135,14 +138,15 @@ static void count(plr_session *s) {
     s->totals.landmarks += s->in.kind == PLR_KIND_LANDMARK;
     s->totals.readings += s->in.kind == PLR_KIND_READING;
     s->totals.imus += s->in.kind == PLR_KIND_IMU;
+    s->totals.images += s->in.kind == PLR_KIND_IMAGE;
     s->totals.imu_readings += s->in.kind == PLR_KIND_IMU ? s->in.as.imu.count : 0;
     s->is_log = s->is_log || is_in_force(&s->in);
 }
 
 /* What this session says itself is not echoed: CONFIG in force, END, a log's TEXT. A restore that
- * is used is echoed later. */
+ * is used is echoed later, and what pictures show as a STEREO. */
 static void echo(plr_session *s, unsigned row, plr_rule rule) {
-    const bool own = is_in_force(&s->in) || row == PLR_KIND_END ||
+    const bool own = is_in_force(&s->in) || row == PLR_KIND_END || row == PLR_KIND_IMAGE ||
                      (row == PLR_KIND_TEXT && s->is_log) || (row == RESTORE && rule == USE);
     if (!own)
         plr_send_echo(s);
@@ -167,6 +171,8 @@ static void refuse(plr_session *s, plr_status status) {
     const plr_message *in = &s->in;
     if (in->kind == PLR_KIND_STEREO)
         plr_send_frame_refusal(s, &in->as.stereo, status);
+    else if (in->kind == PLR_KIND_IMAGE && in->as.image.first_px > 0)
+        s->totals.refused++; /* its first band was answered */
     else if (in->kind == PLR_KIND_STATE)
         plr_saving_refuse(s, (plr_state_action)in->as.state.action, plr_message_time(in), status);
     else
@@ -188,22 +194,21 @@ static void start(plr_session *s) {
     }
 }
 
-/* Lowers the budget of a STEREO to what can be computed before the deadline. */
-static void limit_frame(plr_session *s) {
-    const uint16_t budget = plr_budget_next(&s->budget);
-    if (s->port.now_ns != NULL && budget < s->in.as.stereo.budget)
-        s->in.as.stereo.budget = budget;
+/* What happens to a message of that row now; the first data lead to another phase. */
+static plr_rule enter(plr_session *s, unsigned row) {
+    if (table[row].rules[s->phase] == FIRST) {
+        plr_phase_change(&s->phase, PLR_TRIGGER_DATA);
+        if (s->phase == PLR_PHASE_READY)
+            start(s);
+    }
+    return (plr_rule)table[row].rules[s->phase];
 }
 
 static void handle(plr_session *s) {
     const unsigned row = row_of(&s->in);
     PLR_ASSERT(row < ROWS && s->phase < PLR_PHASES);
     count(s);
-    if (table[row].rules[s->phase] == FIRST) {
-        plr_phase_change(&s->phase, PLR_TRIGGER_DATA);
-        if (s->phase == PLR_PHASE_READY)
-            start(s);
-    }
+    (void)enter(s, row);
     if ((row == PLR_KIND_START || row == PLR_KIND_TRUTH) && s->phase == PLR_PHASE_STARTING)
         plr_events_use_frames_before(s, plr_message_time(&s->in)); /* it may set the start pose */
     const plr_rule rule = (plr_rule)table[row].rules[s->phase];
@@ -211,7 +216,7 @@ static void handle(plr_session *s) {
     if (rule == IGNORE)
         return;
     if (row == PLR_KIND_STEREO)
-        limit_frame(s);
+        plr_use_limit(s, &s->in.as.stereo);
     echo(s, row, rule);
     const plr_status status = check(s, row, rule);
     if (status != PLR_OK)
@@ -220,6 +225,17 @@ static void handle(plr_session *s) {
         table[row].use(s);
     else if (rule == KEEP)
         plr_start_keep(s);
+}
+
+plr_status plr_session_look(plr_session *s, const plr_picture_pair *pair) {
+    if (s == NULL || pair == NULL)
+        return PLR_E_ARGUMENT;
+    if (s->options.eyes == NULL)
+        return PLR_E_MODE;
+    memset(&s->in, 0, sizeof s->in);
+    s->in.kind = PLR_KIND_IMAGE;
+    s->in.as.image.t_ns = pair->left.t_ns;
+    return enter(s, PLR_KIND_IMAGE) == USE ? plr_look_at(s, pair) : PLR_E_NOT_READY;
 }
 
 /* --- the loop --- */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "pelorus/assertions.h"
+#include "pelorus/eyes.h"
 #include "session/budget.h"
 #include "session/known_map.h"
 #include "session/layers.h"
@@ -32,6 +33,8 @@ void plr_start_clear(plr_session *s) {
     for (unsigned i = 0; i < s->options.map_count; i++)
         (void)plr_known_map_add(&s->known, &s->options.map[i]); /* plr_session_init has checked */
     s->watch.agreeing = s->step_watch.agreeing = 0;
+    if (s->options.eyes != NULL)
+        s->options.eyes->calls->clear(s->options.eyes);
     plr_budget_init(&s->budget, s->options.deadline_us);
 }
 
@@ -46,6 +49,9 @@ static bool same_header(const plr_header *a, const plr_header *b) {
 }
 
 bool plr_start_in_force(const plr_session *s) {
+    const plr_eyes *eyes = s->options.eyes;
+    if (s->in.kind == PLR_KIND_RIG)
+        return eyes == NULL || eyes->calls->same_rig(eyes, &s->in.as.rig);
     return s->in.kind == PLR_KIND_CONFIG
                ? plr_layers_agree(&s->in.as.config, plr_filter_config(&s->filter))
                : same_header(&s->in.as.header, &s->header);
@@ -175,6 +181,8 @@ plr_status plr_start_filter(plr_session *s) {
     const plr_setting *culprit = NULL;
     plr_config config;
     const plr_status status = init_filter(s, &config, &culprit);
+    if (status == PLR_OK && s->options.eyes != NULL)
+        s->options.eyes->calls->begin(s->options.eyes, &s->header, config.camera_offset_s);
     if (status != PLR_OK) {
         plr_phase_change(&s->phase, PLR_TRIGGER_REJECTED);
         tell_contradiction(s, &config);

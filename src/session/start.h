@@ -8,7 +8,7 @@
 /* Clears what belongs to a drive: counts, settings, START, known landmarks, delayed twists. */
 void plr_start_clear(plr_session *s);
 
-/* True if s->in, a HEADER or CONFIG, equals the one in use. */
+/* True if s->in, a HEADER, CONFIG or RIG, equals the one in use. */
 bool plr_start_in_force(const plr_session *s);
 
 /* Begins a drive with the HEADER s->in. */

@@ -2,6 +2,7 @@
 #include "session/use.h"
 
 #include "pelorus/assertions.h"
+#include "pelorus/eyes.h"
 #include "session/budget.h"
 #include "session/clock.h"
 #include "session/line.h"
@@ -130,6 +131,14 @@ static plr_status predict(plr_session *s, const plr_event *step) {
     return status;
 }
 
+/* Eyes look where the body is expected to have moved. */
+static void tell_eyes(plr_session *s, plr_time_ns t_ns) {
+    plr_eyes *eyes = s->options.eyes;
+    plr_twist velocity;
+    if (eyes != NULL && plr_filter_velocity(&s->filter, &velocity) == PLR_OK)
+        eyes->calls->moved(eyes, t_ns, &velocity);
+}
+
 static void use_step(plr_session *s, const plr_event *step) {
     plr_start_apply_until(s, step->t_ns);
     plr_status status = predict(s, step);
@@ -151,6 +160,7 @@ static void use_step(plr_session *s, const plr_event *step) {
     s->order.stepped = true;
     s->order.stepped_ns = step->t_ns;
     s->imu_status = PLR_OK;
+    tell_eyes(s, step->t_ns);
     if ((s->options.output & PLR_OUTPUT_TWIST_POSE) != 0)
         (void)plr_send_pose(s, false);
 }
@@ -232,6 +242,12 @@ static void use_frame(plr_session *s, const plr_event *event) {
         plr_send_frame_refusal(s, frame, PLR_E_TIME);
     else
         update_by(s, frame, event->t_ns);
+}
+
+void plr_use_limit(const plr_session *s, plr_frame *frame) {
+    const uint16_t budget = plr_budget_next(&s->budget);
+    if (s->port.now_ns != NULL && budget < frame->budget)
+        frame->budget = budget;
 }
 
 /* --- each --- */

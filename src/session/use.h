@@ -19,6 +19,9 @@
 /* Gives the event to the filter. */
 void plr_use(plr_session *s, const plr_event *event);
 
+/* Lowers the budget of a frame to what can be computed before the deadline. */
+void plr_use_limit(const plr_session *s, plr_frame *frame);
+
 /* Answers an event that is refused. */
 void plr_use_refuse(plr_session *s, const plr_event *event, plr_status status);
 

@@ -163,7 +163,7 @@ void plr_calibration_note_rate(plr_camera_model *camera, const plr_source *sourc
     plr_camera_estimate *c = &camera->estimate;
     const plr_real gain = rate_gain(&source->inertial), left = PLR_R(1) - gain;
     const plr_real noise = PLR_R(0.5) * source->inertial.change2[1];
-    if (!source->inertial.started) {
+    if (source->inertial.phase < PLR_IMU_UNSETTLED) {
         memcpy(c->rate, source->inertial.slow + 3, sizeof c->rate);
         c->rate_variance = noise * PLR_R(2) * source->inertial.usual_s;
         return;

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "supervise/health.h"
 
-#include "supervise/limits.h"
+#include "limits/limits.h"
 #include "supervise/readings.h"
-
-/* A reading is not old before this, s. */
-#define HELD_S 0.05
 
 bool plr_health_readings_are_old(const plr_supervisor *s, const plr_readings_evidence *now) {
     const double held = plr_health_seconds(now->reading_ns, now->now_ns);
-    const double intervals = (double)plr_limit(s, PLR_LIMIT_HELD_INTERVALS);
-    return now->needed && (!now->valid || held > intervals * (double)now->interval_s + HELD_S);
+    const double intervals = (double)plr_limit(s->left_out, PLR_LIMIT_HELD_INTERVALS);
+    const double held_s = 1e-3 * (double)plr_limit(s->left_out, PLR_LIMIT_HELD_MS);
+    return now->needed && (!now->valid || held > intervals * (double)now->interval_s + held_s);
 }
 
 uint32_t plr_health_of_readings(const plr_supervisor *s, const plr_readings_evidence *now) {
@@ -33,7 +31,7 @@ uint32_t plr_health_of_readings(const plr_supervisor *s, const plr_readings_evid
 uint32_t plr_health_lost_by(const plr_supervisor *s, plr_time_ns now_ns) {
     const uint32_t always = PLR_REASON_GATE_LOCKED | PLR_REASON_NOT_STARTED;
     const bool positioned = plr_health_seconds(s->last_position_ns, now_ns) <=
-                            (double)plr_limit(s, PLR_LIMIT_POSITION_S);
+                            (double)plr_limit(s->left_out, PLR_LIMIT_POSITION_S);
     return positioned ? always : always | PLR_REASON_NO_OBSERVATIONS | PLR_REASON_NO_FRAMES;
 }
 

@@ -3,12 +3,10 @@
 
 #include <string.h>
 
+#include "limits/limits.h"
 #include "math/dense.h"
 #include "math/small.h"
-#include "supervise/limits.h"
 #include "supervise/sum.h"
-
-enum { LEAST = 4 }; /* landmarks */
 
 void plr_map_forget(plr_supervisor *s) {
     memset(s->map_moved, 0, sizeof s->map_moved);
@@ -79,7 +77,7 @@ static plr_real judge(const plr_supervisor *s, const plr_map_evidence *e, plr_ma
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, v->nu, 1);
     in_units_of(U, due);
     plr_upper6_pack(V, due);
-    plr_sum_by_pictures(v->nu, V, plr_limit(s, PLR_LIMIT_UNOBSERVED), by_map);
+    plr_sum_by_pictures(v->nu, V, plr_limit(s->left_out, PLR_LIMIT_UNOBSERVED), by_map);
     v->noise = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         d2 = PLR_FMA(v->nu[k], by_map[k], d2);
@@ -93,9 +91,10 @@ static plr_real judge(const plr_supervisor *s, const plr_map_evidence *e, plr_ma
 
 void plr_map_add(plr_supervisor *s, const plr_map_evidence *e, plr_map_verdict *verdict) {
     verdict->disagrees = false;
-    if (e->adopted >= LEAST && 2 * e->adopted >= e->known) {
+    if (e->adopted >= plr_limit_count(s->left_out, PLR_LIMIT_MAP_LEAST) &&
+        2 * e->adopted >= e->known) {
         plr_map_forget(s);
-        s->map_frames = (uint8_t)plr_limit_count(s, PLR_LIMIT_MAP_FRAMES);
+        s->map_frames = (uint8_t)plr_limit_count(s->left_out, PLR_LIMIT_MAP_FRAMES);
         add_in_world(e->R_WB, 1, e->calibration, s->map_variance);
     }
     /* with odometry that is off, it is that which the map corrects */
@@ -105,7 +104,7 @@ void plr_map_add(plr_supervisor *s, const plr_map_evidence *e, plr_map_verdict *
         return;
     add_correction(s, e);
     s->map_frames--;
-    verdict->disagrees = judge(s, e, verdict) > plr_limit(s, PLR_LIMIT_MAP_ABOVE);
+    verdict->disagrees = judge(s, e, verdict) > plr_limit(s->left_out, PLR_LIMIT_MAP_ABOVE);
     if (verdict->disagrees)
         plr_map_forget(s);
 }

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "limits/limits.h"
 #include "math/dense.h"
 #include "math/leaky.h"
 #include "math/se3.h"
@@ -10,12 +11,8 @@
 #include "pelorus/assertions.h"
 #include "pelorus/settings.h"
 #include "supervise/doubt.h"
-#include "supervise/limits.h"
 #include "supervise/sum.h"
 #include "supervise/supervise.h"
-
-/* What an average of a frame's own square is worth to what is usual: a frame that is far off is an event. */
-#define MOST_TIMES_USUAL PLR_R(4)
 
 void plr_odometry_forget(plr_supervisor *s) {
     memset(&s->sum, 0, sizeof s->sum);
@@ -67,7 +64,7 @@ static void lately(const plr_supervisor *s, plr_real floor, plr_real mean[PLR_PO
     plr_sum_by_pictures(s->sum.sum, s->sum.variance, floor, mean);
     for (unsigned k = 0; k < PLR_POSE_DIM;
          k++) /* s / V of a lasting difference is (1 + keep) of it */
-        mean[k] /= PLR_R(1) + plr_limit(s, PLR_LIMIT_SUM_KEEPS);
+        mean[k] /= PLR_R(1) + plr_limit(s->left_out, PLR_LIMIT_SUM_KEEPS);
 }
 
 /* ---------------------------------------------------------------- what is usual */
@@ -75,7 +72,7 @@ static void lately(const plr_supervisor *s, plr_real floor, plr_real mean[PLR_PO
 /* Once told it stays until the variances are usually less than half of that. */
 static void judge_usual(plr_supervisor *s) {
     const plr_real limit =
-        plr_limit(s, PLR_LIMIT_USUAL_TOLD) * (s->misfits ? PLR_R(0.5) : PLR_R(1));
+        plr_limit(s->left_out, PLR_LIMIT_USUAL_TOLD) * (s->misfits ? PLR_R(0.5) : PLR_R(1));
     s->misfits = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         s->misfits |= s->usual[k] > limit;
@@ -83,15 +80,16 @@ static void judge_usual(plr_supervisor *s) {
 
 /* Learns from the sum, direction by direction, how much odometry and pictures differ on this drive. */
 static void learn_usual(plr_supervisor *s) {
-    const plr_real frames = plr_limit(s, PLR_LIMIT_USUAL_FRAMES);
-    const plr_real most = plr_limit(s, PLR_LIMIT_USUAL_MOST);
+    const plr_real frames = plr_limit(s->left_out, PLR_LIMIT_USUAL_FRAMES);
+    const plr_real most = plr_limit(s->left_out, PLR_LIMIT_USUAL_MOST);
+    const plr_real step = plr_limit(s->left_out, PLR_LIMIT_USUAL_STEP);
     if (s->usual_frames < frames)
         s->usual_frames += PLR_R(1);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real due =
-            s->sum.variance[plr_upper_row(PLR_POSE_DIM, k)] + plr_limit(s, PLR_LIMIT_UNOBSERVED);
+        const plr_real due = s->sum.variance[plr_upper_row(PLR_POSE_DIM, k)] +
+                             plr_limit(s->left_out, PLR_LIMIT_UNOBSERVED);
         const plr_real square = s->sum.sum[k] * s->sum.sum[k] / due;
-        const plr_real at_most = MOST_TIMES_USUAL * s->usual[k];
+        const plr_real at_most = step * s->usual[k];
         const plr_real now = square < at_most ? square : at_most;
         s->usual[k] += (now - s->usual[k]) / (s->usual_frames + PLR_R(20));
         s->usual[k] = s->usual[k] < 1 ? PLR_R(1) : s->usual[k] > most ? most : s->usual[k];
@@ -99,14 +97,9 @@ static void learn_usual(plr_supervisor *s) {
     judge_usual(s);
 }
 
-/* An event needs a before: the odometry has agreed with the pictures on this drive. */
-static bool has_before(const plr_supervisor *s) {
-    const bool agreed = s->agreement >= plr_limit(s, PLR_LIMIT_BEFORE_SHARE);
+bool plr_odometry_has_before(const plr_supervisor *s) {
+    const bool agreed = s->agreement >= plr_limit(s->left_out, PLR_LIMIT_BEFORE_SHARE);
     return (agreed && !s->misfits) || plr_doubt_contradicted(s);
-}
-
-bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
-    return has_before(s);
 }
 
 /* ---------------------------------------------------------------- the difference of two poses */
@@ -151,7 +144,7 @@ static plr_real trace(const plr_real V[PLR_POSE_TRIANGLE]) {
 
 void plr_odometry_cover(const plr_supervisor *s, const plr_real d[PLR_POSE_DIM],
                         plr_real C[PLR_POSE_SQUARE]) {
-    const plr_real sideways = plr_limit(s, PLR_LIMIT_SIDEWAYS);
+    const plr_real sideways = plr_limit(s->left_out, PLR_LIMIT_SIDEWAYS);
     const plr_real sigmas2 = plr_norm2_of_6(s->difference_sigmas);
     const plr_real unexplained =
         sigmas2 > s->difference_noise ? PLR_R(1) - s->difference_noise / sigmas2 : PLR_R(0);
@@ -189,7 +182,7 @@ static void differ_by_pictures(plr_supervisor *s, const plr_motion_evidence *m,
                                const plr_real nu[PLR_POSE_DIM]) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
     plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
-    lately(s, plr_limit(s, PLR_LIMIT_UNOBSERVED), mean);
+    lately(s, plr_limit(s->left_out, PLR_LIMIT_UNOBSERVED), mean);
     memcpy(U, m->Lambda, sizeof m->Lambda);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return;
@@ -204,7 +197,7 @@ static void differ_by_odometry(plr_supervisor *s, const plr_motion_evidence *m,
                                const plr_real nu[PLR_POSE_DIM],
                                const plr_real V[PLR_POSE_TRIANGLE]) {
     plr_real n[PLR_POSE_DIM], way[PLR_POSE_DIM];
-    plr_sum_by_pictures(nu, V, plr_limit(s, PLR_LIMIT_UNOBSERVED), n);
+    plr_sum_by_pictures(nu, V, plr_limit(s->left_out, PLR_LIMIT_UNOBSERVED), n);
     plr_mat6_vec(way, m->L, n);
     add_longer(s, m, way, nu, trace(V));
 }
@@ -212,9 +205,9 @@ static void differ_by_odometry(plr_supervisor *s, const plr_motion_evidence *m,
 /* What the sum holds of the difference when it is found: by odometry what was applied of it, by pictures
  * what was not. */
 static void begin_difference(plr_supervisor *s, const plr_motion_evidence *m) {
-    const plr_real frames = PLR_R(1) / (PLR_R(1) - plr_limit(s, PLR_LIMIT_SUM_KEEPS));
+    const plr_real frames = PLR_R(1) / (PLR_R(1) - plr_limit(s->left_out, PLR_LIMIT_SUM_KEEPS));
     plr_real all[PLR_POSE_DIM], way[PLR_POSE_DIM];
-    lately(s, plr_limit(s, PLR_LIMIT_WEAK), all);
+    lately(s, plr_limit(s->left_out, PLR_LIMIT_WEAK), all);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         all[k] = s->scene == PLR_SCENE_MAY_MOVE ? s->sum.sum[k] : frames * all[k] - s->sum.sum[k];
     plr_mat6_vec(way, m->L, all);
@@ -239,9 +232,9 @@ static void follow_difference(plr_supervisor *s, const plr_motion_evidence *m,
 /* An average of the last frames, of those that may count: not of an event, nor shortly after it. One that
  * neither agrees nor departs may be the beginning of an event, and must not take its before away. */
 static void learn_agreement(plr_supervisor *s) {
-    const plr_real keeps = plr_limit(s, PLR_LIMIT_BEFORE_KEEPS);
-    const bool agrees = s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
-    if (agrees || s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE))
+    const plr_real keeps = plr_limit(s->left_out, PLR_LIMIT_BEFORE_KEEPS);
+    const bool agrees = s->statistic < plr_limit(s->left_out, PLR_LIMIT_AGREES_BELOW);
+    if (agrees || s->statistic > plr_limit(s->left_out, PLR_LIMIT_DEPARTS_ABOVE))
         s->agreement = plr_leaky_sum(s->agreement, keeps, agrees ? PLR_R(1) - keeps : PLR_R(0));
 }
 
@@ -259,33 +252,37 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
         return verdict;
     const bool calm = s->doubt == PLR_DOUBT_NONE;
     carry_difference(s, m);
-    plr_sum_add(&s->sum, plr_limit(s, PLR_LIMIT_SUM_KEEPS), nu, V);
-    s->statistic = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_UNOBSERVED));
-    const bool before = has_before(s);
+    plr_sum_add(&s->sum, plr_limit(s->left_out, PLR_LIMIT_SUM_KEEPS), nu, V);
+    s->statistic =
+        plr_sum_statistic(&s->sum, s->usual, plr_limit(s->left_out, PLR_LIMIT_UNOBSERVED));
+    const bool before = plr_odometry_has_before(s);
     if ((calm || !before) && tells)
         learn_usual(s);
     if (calm || !before)
         learn_agreement(s);
-    const plr_real weighed = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
-    const bool contradicts = weighed > plr_limit(s, PLR_LIMIT_CONTRADICTS_ABOVE);
+    const plr_real weighed =
+        plr_sum_statistic(&s->sum, s->usual, plr_limit(s->left_out, PLR_LIMIT_WEAK));
+    const bool contradicts = weighed > plr_limit(s->left_out, PLR_LIMIT_CONTRADICTS_ABOVE);
     s->contradicting_frames = contradicts ? one_more(s->contradicting_frames) : 0;
     verdict.contradicts =
         before && s->slips && !plr_doubt_contradicted(s) &&
-        s->contradicting_frames >= plr_limit_count(s, PLR_LIMIT_CONTRADICTS_FRAMES);
-    verdict.departs = before && s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE);
+        s->contradicting_frames >= plr_limit_count(s->left_out, PLR_LIMIT_CONTRADICTS_FRAMES);
+    verdict.departs = before && s->statistic > plr_limit(s->left_out, PLR_LIMIT_DEPARTS_ABOVE);
     if (!held)
         follow_difference(s, m, nu, V, verdict.departs && (calm || s->doubt == PLR_DOUBT_SETTLING));
     return verdict;
 }
 
 void plr_odometry_weigh(plr_supervisor *s, plr_real excess) {
-    const plr_real keeps = plr_limit(s, PLR_LIMIT_SUM_KEEPS);
+    const plr_real keeps = plr_limit(s->left_out, PLR_LIMIT_SUM_KEEPS);
     const plr_real before = s->slips ? PLR_R(0) : PLR_FMA(s->weight, s->weight, -PLR_R(1));
     s->weight = 1;
     if (!plr_doubt_contradicted(s))
         return;
-    const plr_real now = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
-    const plr_real lost = plr_limit(s, PLR_LIMIT_WEIGHT_LOST) * (now > excess ? now : excess);
+    const plr_real now =
+        plr_sum_statistic(&s->sum, s->usual, plr_limit(s->left_out, PLR_LIMIT_WEAK));
+    const plr_real lost =
+        plr_limit(s->left_out, PLR_LIMIT_WEIGHT_LOST) * (now > excess ? now : excess);
     const plr_real fades = keeps * keeps * before;
     s->weight = PLR_SQRT((lost > fades ? lost : fades) + PLR_R(1));
     PLR_ASSERT(s->weight >= 1);

@@ -20,6 +20,9 @@ typedef struct plr_odometry_verdict {
 /* The sum forgets; what is usual is kept. */
 void plr_odometry_forget(plr_supervisor *s);
 
+/* True if the odometry has agreed with the pictures on this drive: an event needs a before. */
+bool plr_odometry_has_before(const plr_supervisor *s);
+
 /* Adds a frame's motion. `held`: its last reading is too old to say where the body would be by odometry.
  * `tells`: the frame shows what is usual; one of few points, or after a time in the dark, does not. */
 plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,

@@ -3,14 +3,9 @@
 
 #include <string.h>
 
+#include "limits/limits.h"
 #include "math/leaky.h"
-#include "supervise/limits.h"
 #include "supervise/supervise.h"
-
-/* What the sums of innovations keep from frame to frame, and the degrees of freedom that it takes to judge
- * by them. */
-#define NIS_KEEPS PLR_R(0.7)
-#define NIS_DOF   PLR_R(80)
 
 /* ---------------------------------------------------------------- a frozen picture */
 
@@ -23,7 +18,7 @@ void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
 
 /* True if the motion since the picture was new is larger than its noise. */
 static bool has_moved(const plr_supervisor *s, const plr_picture_evidence *e) {
-    const plr_real above = plr_limit(s, PLR_LIMIT_FROZEN_ABOVE);
+    const plr_real above = plr_limit(s->left_out, PLR_LIMIT_FROZEN_ABOVE);
     plr_real sum = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real moved = s->frozen_motion[k] + e->moved[k];
@@ -36,12 +31,10 @@ static bool has_moved(const plr_supervisor *s, const plr_picture_evidence *e) {
     return sum > above;
 }
 
-/* A frozen picture would hold a moving body: it repeats the last one, though the body has moved by more than
- * noise. */
-bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
+bool plr_pictures_show_present(plr_supervisor *s, const plr_picture_evidence *e) {
     const bool repeats =
-        e->matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
-        (plr_real)e->same >= plr_limit(s, PLR_LIMIT_FROZEN_SHARE) * (plr_real)e->matched;
+        e->matched >= plr_limit_count(s->left_out, PLR_LIMIT_FEW) &&
+        (plr_real)e->same >= plr_limit(s->left_out, PLR_LIMIT_FROZEN_SHARE) * (plr_real)e->matched;
     s->frozen = repeats && has_moved(s, e);
     if (!repeats) {
         memset(s->frozen_motion, 0, sizeof s->frozen_motion);
@@ -63,12 +56,12 @@ bool plr_pictures_misled(const plr_supervisor *s) {
 /* ---------------------------------------------------------------- the gate */
 
 bool plr_pictures_reject_all(const plr_supervisor *s, unsigned matched, unsigned gated) {
-    return matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
-           (plr_real)gated >= plr_limit(s, PLR_LIMIT_LOCK_SHARE) * (plr_real)matched;
+    return matched >= plr_limit_count(s->left_out, PLR_LIMIT_FEW) &&
+           (plr_real)gated >= plr_limit(s->left_out, PLR_LIMIT_LOCK_SHARE) * (plr_real)matched;
 }
 
 bool plr_pictures_lock(plr_supervisor *s, unsigned matched, unsigned gated) {
-    const uint16_t frames = (uint16_t)plr_limit_count(s, PLR_LIMIT_LOCK_FRAMES);
+    const uint16_t frames = (uint16_t)plr_limit_count(s->left_out, PLR_LIMIT_LOCK_FRAMES);
     const bool rejects = plr_pictures_reject_all(s, matched, gated);
     s->frames_mostly_gated = rejects ? (uint16_t)(s->frames_mostly_gated + 1) : 0;
     if (s->frames_mostly_gated >= 2 * frames) /* locked again */
@@ -76,26 +69,25 @@ bool plr_pictures_lock(plr_supervisor *s, unsigned matched, unsigned gated) {
     return s->frames_mostly_gated == frames;
 }
 
-/* After a lock, or after ten frames without a used observation, until one is used: a gate of fixed width would
- * reject everything for ever. */
-bool plr_supervise_opens_fixed_gate(const plr_supervisor *s) {
-    return s->frames_mostly_gated >= plr_limit_count(s, PLR_LIMIT_LOCK_FRAMES) ||
-           s->frames_without_use >= plr_limit_count(s, PLR_LIMIT_LOST_FRAMES);
+bool plr_pictures_open_fixed_gate(const plr_supervisor *s) {
+    return s->frames_mostly_gated >= plr_limit_count(s->left_out, PLR_LIMIT_LOCK_FRAMES) ||
+           s->frames_without_use >= plr_limit_count(s->left_out, PLR_LIMIT_LOST_FRAMES);
 }
 
 /* ---------------------------------------------------------------- counts */
 
 static uint32_t noise_reasons(const plr_supervisor *s) {
-    if (!(s->nis_dof > NIS_DOF))
+    if (!(s->nis_dof > plr_limit(s->left_out, PLR_LIMIT_NIS_DOF)))
         return 0;
-    return s->nis > plr_limit(s, PLR_LIMIT_NIS_HIGH) * s->nis_dof  ? PLR_REASON_NIS_HIGH
-           : s->nis < plr_limit(s, PLR_LIMIT_NIS_LOW) * s->nis_dof ? PLR_REASON_NIS_LOW
-                                                                   : 0;
+    return s->nis > plr_limit(s->left_out, PLR_LIMIT_NIS_HIGH) * s->nis_dof  ? PLR_REASON_NIS_HIGH
+           : s->nis < plr_limit(s->left_out, PLR_LIMIT_NIS_LOW) * s->nis_dof ? PLR_REASON_NIS_LOW
+                                                                             : 0;
 }
 
 uint32_t plr_pictures_add(plr_supervisor *s, const plr_report *report, plr_time_ns t_ns,
                           bool has_gate) {
-    const uint32_t inert = plr_limit_count(s, PLR_LIMIT_INERT_MATCHES);
+    const uint32_t inert = plr_limit_count(s->left_out, PLR_LIMIT_INERT_MATCHES);
+    const plr_real keeps = plr_limit(s->left_out, PLR_LIMIT_NIS_KEEPS);
     uint32_t reasons = 0;
     s->frames_without_use =
         report->used > 0 ? 0
@@ -103,14 +95,14 @@ uint32_t plr_pictures_add(plr_supervisor *s, const plr_report *report, plr_time_
     s->matches_since_gated = report->gated ? 0 : s->matches_since_gated + report->matched;
     if (s->matches_since_gated > inert)
         s->matches_since_gated = inert;
-    s->nis = plr_leaky_sum(s->nis, NIS_KEEPS, (plr_real)report->nis);
-    s->nis_dof = plr_leaky_sum(s->nis_dof, NIS_KEEPS, (plr_real)report->nis_dof);
-    if (report->used < plr_limit_count(s, PLR_LIMIT_FEW))
+    s->nis = plr_leaky_sum(s->nis, keeps, (plr_real)report->nis);
+    s->nis_dof = plr_leaky_sum(s->nis_dof, keeps, (plr_real)report->nis_dof);
+    if (report->used < plr_limit_count(s->left_out, PLR_LIMIT_FEW))
         reasons |= PLR_REASON_FEW_OBSERVATIONS;
     const bool late =
         s->last_use_ns != PLR_NEVER_NS && t_ns > s->last_use_ns &&
-        (plr_real)(t_ns - s->last_use_ns) * PLR_R(1e-9) > plr_limit(s, PLR_LIMIT_LOST_S);
-    if (s->frames_without_use >= plr_limit_count(s, PLR_LIMIT_LOST_FRAMES) ||
+        (plr_real)(t_ns - s->last_use_ns) * PLR_R(1e-9) > plr_limit(s->left_out, PLR_LIMIT_LOST_S);
+    if (s->frames_without_use >= plr_limit_count(s->left_out, PLR_LIMIT_LOST_FRAMES) ||
         (s->frames_without_use > 0 && late))
         reasons |= PLR_REASON_NO_OBSERVATIONS;
     if (s->matches_since_gated >= inert && has_gate)

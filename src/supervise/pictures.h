@@ -6,6 +6,14 @@
 
 #include "pelorus/supervisor.h"
 
+/* False of a frozen picture, which would hold a moving body: it repeats the last one, though the body has moved
+ * by more than noise. */
+bool plr_pictures_show_present(plr_supervisor *s, const plr_picture_evidence *e);
+
+/* True after a lock, or after ten frames without a used observation, until one is used: a gate of fixed width
+ * would reject everything for ever. */
+bool plr_pictures_open_fixed_gate(const plr_supervisor *s);
+
 /* True if the picture repeats an older one, and others that did so were used before the body was seen to have moved. */
 bool plr_pictures_misled(const plr_supervisor *s);
 

@@ -3,12 +3,12 @@
 
 #include <string.h>
 
+#include "limits/limits.h"
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "supervise/doubt.h"
 #include "supervise/health.h"
-#include "supervise/limits.h"
 #include "supervise/map.h"
 #include "supervise/odometry.h"
 #include "supervise/pictures.h"
@@ -47,18 +47,29 @@ void plr_supervise_begin(plr_supervisor *s, const plr_config *config) {
 /* The pose may be wrong, until pictures and odometry have agreed. */
 static void lose(plr_supervisor *s) {
     plr_doubt_change(s, PLR_DOUBT_LOSES);
-    s->settle_frames = (uint8_t)plr_limit_count(s, PLR_LIMIT_SETTLED_FRAMES);
+    s->settle_frames = (uint8_t)plr_limit_count(s->left_out, PLR_LIMIT_SETTLED_FRAMES);
 }
 
 /* ---------------------------------------------------------------- the three points of a frame */
+
+static plr_picture_decision decide_on_picture(const plr_supervisor *s, bool use) {
+    return (plr_picture_decision){.use = use,
+                                  .weight = s->weight,
+                                  .may_exclude_odometry = plr_odometry_has_before(s),
+                                  .opens_fixed_gate = plr_pictures_open_fixed_gate(s)};
+}
+
+plr_picture_decision plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
+    return decide_on_picture(s, !e->may_repeat || plr_pictures_show_present(s, e));
+}
 
 /* True if points have excluded the odometry for long enough to be followed: twists for one frame; an IMU for as long
  * as it takes far points, which have no part in a motion near the camera, to tell it from that of the body. */
 static bool is_confirmed(const plr_supervisor *s, plr_time_ns now_ns) {
     if (s->slips)
-        return s->outright || plr_limit_count(s, PLR_LIMIT_CONFIRMED) == 0;
+        return s->outright || plr_limit_count(s->left_out, PLR_LIMIT_CONFIRMED) == 0;
     const double since_s = 1e-9 * (double)(now_ns - s->outright_ns);
-    return since_s >= (double)plr_limit(s, PLR_LIMIT_CONFIRMED_S);
+    return since_s >= (double)plr_limit(s->left_out, PLR_LIMIT_CONFIRMED_S);
 }
 
 plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evidence *e) {
@@ -77,7 +88,8 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
     }
     decision.hold_biases =
         e->outright || plr_doubt_contradicted(s) ||
-        (s->doubted_frames > 0 && s->doubted_frames < plr_limit_count(s, PLR_LIMIT_HELD_FRAMES));
+        (s->doubted_frames > 0 &&
+         s->doubted_frames < plr_limit_count(s->left_out, PLR_LIMIT_HELD_FRAMES));
     decision.drop_rejected = plr_pictures_lock(s, e->matched, e->gated);
     decision.make_none = s->frames_mostly_gated > 0 && !decision.drop_rejected;
     s->holds_biases = decision.hold_biases;
@@ -88,10 +100,11 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
  * P_0 the prior's variance and the walk's since: by less than the prior's sigma as long as little has been
  * learnt. */
 static bool bias_is_off(const plr_supervisor *s, const plr_bias_evidence *b) {
-    const plr_real sigmas = plr_limit(s, PLR_LIMIT_BIAS_SIGMAS);
+    const plr_real sigmas = plr_limit(s->left_out, PLR_LIMIT_BIAS_SIGMAS);
     for (unsigned k = 0; k < PLR_BIAS_DIM && b->estimated; k++) {
         const plr_real learnt = b->prior[k] - b->variance[k];
-        if (b->prior[k] > 0 && learnt > plr_limit(s, PLR_LIMIT_BIAS_LEARNT) * b->prior[k] &&
+        if (b->prior[k] > 0 &&
+            learnt > plr_limit(s->left_out, PLR_LIMIT_BIAS_LEARNT) * b->prior[k] &&
             b->off[k] * b->off[k] > sigmas * sigmas * learnt)
             return true;
     }
@@ -136,7 +149,7 @@ static uint32_t hear_map(plr_supervisor *s, const plr_frame_evidence *e) {
 
 /* The frame's one event of the doubt, the weightiest first. */
 static void change_doubt(plr_supervisor *s, const plr_odometry_verdict *o, bool lost) {
-    const uint8_t settled = (uint8_t)plr_limit_count(s, PLR_LIMIT_SETTLED_FRAMES);
+    const uint8_t settled = (uint8_t)plr_limit_count(s->left_out, PLR_LIMIT_SETTLED_FRAMES);
     if (o->contradicts) {
         plr_doubt_change(s, PLR_DOUBT_CONTRADICTS);
         s->settle_frames = settled;
@@ -144,7 +157,7 @@ static void change_doubt(plr_supervisor *s, const plr_odometry_verdict *o, bool 
         plr_doubt_change(s, PLR_DOUBT_DEPARTS);
         if (s->doubt == PLR_DOUBT_DEPARTED && s->settle_frames < settled)
             s->settle_frames++; /* as long as it lasted, so that noise is soon forgotten */
-    } else if (s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW)) {
+    } else if (s->statistic < plr_limit(s->left_out, PLR_LIMIT_AGREES_BELOW)) {
         plr_doubt_change(s, PLR_DOUBT_RETURNS);
     }
     if (lost || plr_pictures_misled(s))
@@ -166,8 +179,8 @@ static void settle(plr_supervisor *s, plr_frame_decision *decision) {
 static void count_doubt(plr_supervisor *s, bool lost, const plr_report *report) {
     const bool event = lost || plr_pictures_misled(s) || plr_doubt_contradicted(s);
     const bool agrees = !lost && !s->frozen && s->doubt != PLR_DOUBT_DEPARTED && !s->outright &&
-                        report->used >= plr_limit_count(s, PLR_LIMIT_FEW) &&
-                        s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
+                        report->used >= plr_limit_count(s->left_out, PLR_LIMIT_FEW) &&
+                        s->statistic < plr_limit(s->left_out, PLR_LIMIT_AGREES_BELOW);
     if ((event || s->doubted_frames > 0) && s->doubted_frames < UINT16_MAX)
         s->doubted_frames++;
     s->agreeing_frames =
@@ -176,7 +189,7 @@ static void count_doubt(plr_supervisor *s, bool lost, const plr_report *report) 
 
 static uint32_t reasons_of_doubt(const plr_supervisor *s) {
     const bool differs = s->outright || plr_doubt_contradicted(s) ||
-                         s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE) ||
+                         s->statistic > plr_limit(s->left_out, PLR_LIMIT_DEPARTS_ABOVE) ||
                          s->doubt == PLR_DOUBT_DEPARTED;
     return (differs ? PLR_REASON_TWIST_CONTRADICTED : 0U) |
            (s->doubt != PLR_DOUBT_NONE ? PLR_REASON_POSE_MAY_BE_WRONG : 0U) |
@@ -187,8 +200,8 @@ void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const p
                          plr_frame_decision *decision) {
     const bool held = plr_health_readings_are_old(s, &e->readings);
     const bool was_contradicted = plr_doubt_contradicted(s);
-    const bool tells =
-        !held && s->frames_without_use == 0 && report->used >= plr_limit_count(s, PLR_LIMIT_FEW);
+    const bool tells = !held && s->frames_without_use == 0 &&
+                       report->used >= plr_limit_count(s->left_out, PLR_LIMIT_FEW);
     plr_odometry_verdict odometry = {false, false, 0};
     uint32_t reasons = reasons_of_events(&e->events, report);
     memset(decision, 0, sizeof *decision);
@@ -227,10 +240,11 @@ void plr_supervise_pose_set(plr_supervisor *s) {
     forget_frames(s);
 }
 
-void plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
+plr_picture_decision plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
     forget_frames(s);
     lose(s);
     s->relocated = relocated;
+    return decide_on_picture(s, true);
 }
 
 void plr_supervise_reading(plr_supervisor *s, const plr_reading *reading, unsigned numbers,
@@ -298,7 +312,7 @@ void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *
                           plr_health_state *health) {
     health->reasons = s->reasons & ~(uint32_t)(now->looks ? OF_NOW : OF_NOW | OF_PICTURES);
     plr_health_ages(s, now, health);
-    const double lost_s = (double)plr_limit(s, PLR_LIMIT_LOST_S);
+    const double lost_s = (double)plr_limit(s->left_out, PLR_LIMIT_LOST_S);
     if (now->looks && health->seconds_without_frame > lost_s)
         health->reasons |= PLR_REASON_NO_FRAMES;
     if (now->looks && health->seconds_without_use > lost_s)

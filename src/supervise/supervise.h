@@ -17,8 +17,8 @@ void plr_supervise_begin(plr_supervisor *s, const plr_config *config);
 
 /* ---------------------------------------------------------------- the three points of a frame */
 
-/* Before the search: false if the picture does not show the present, and nothing of it is to be used. */
-bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e);
+/* Before the search. */
+plr_picture_decision plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e);
 
 /* After search and gate. */
 plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evidence *e);
@@ -27,31 +27,35 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
 void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const plr_report *report,
                          plr_frame_decision *decision);
 
-/* What was decided at the end of the last frame for this one: a factor of the odometry's sigmas, 1 or more;
- * whether points may agree on a motion that the odometry excludes; whether a gate of fixed width is open. */
-static inline plr_real plr_supervise_weight(const plr_supervisor *s) {
-    return s->weight;
-}
-
-bool plr_supervise_may_exclude_odometry(const plr_supervisor *s);
-bool plr_supervise_opens_fixed_gate(const plr_supervisor *s);
-
 /* ---------------------------------------------------------------- between frames */
 
 /* The pose was set: what was summed up belongs to another. */
 void plr_supervise_pose_set(plr_supervisor *s);
 
-/* The filter has begun anew at the present pose: it is in doubt. */
-void plr_supervise_begun_anew(plr_supervisor *s, bool relocated);
+/* The filter has begun anew at the present pose: it is in doubt. Within a frame the answer takes the place of
+ * the first one. */
+plr_picture_decision plr_supervise_begun_anew(plr_supervisor *s, bool relocated);
 
 /* True if the pose was found anew and has been in doubt since. */
 static inline bool plr_supervise_was_relocated(const plr_supervisor *s) {
     return s->relocated;
 }
 
-/* The clock was set, after an interruption or to a time that the last frame is too far from. */
+/* The clock was interrupted: no time of before counts. */
 static inline void plr_supervise_clock_set(plr_supervisor *s) {
     s->last_frame_ns = s->last_use_ns = s->last_position_ns = PLR_NEVER_NS;
+}
+
+/* It was set to t_ns: the same, if the last frame is not within the gap before it. */
+static inline void plr_supervise_clock_set_to(plr_supervisor *s, plr_time_ns t_ns,
+                                              plr_time_ns max_gap_ns) {
+    if (s->last_frame_ns > t_ns || t_ns - s->last_frame_ns > max_gap_ns)
+        plr_supervise_clock_set(s);
+}
+
+/* When the last frame was, or PLR_NEVER_NS. */
+static inline plr_time_ns plr_supervise_last_frame_ns(const plr_supervisor *s) {
+    return s->last_frame_ns;
 }
 
 /* The pending motion is applied without a frame. */
@@ -80,6 +84,20 @@ void plr_supervise_restored(plr_supervisor *s);
  * frame. */
 void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const plr_real p[3],
                            plr_real P_xi[PLR_POSE_SQUARE]);
+
+/* True unless the last frame missed twists or readings of an IMU. */
+static inline bool plr_supervise_has_readings(const plr_supervisor *s) {
+    return !(s->reasons & PLR_REASON_NO_TWISTS);
+}
+
+/* For measurements: the rules that are left out from now on, bits of plr_limit_id; and those that are. */
+static inline void plr_supervise_leave_out(plr_supervisor *s, uint64_t limits) {
+    s->left_out = limits;
+}
+
+static inline uint64_t plr_supervise_left_out(const plr_supervisor *s) {
+    return s->left_out;
+}
 
 /* What was seen in the last frame, and decided; the rejected landmarks are not filled. */
 void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,

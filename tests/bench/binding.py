@@ -19,12 +19,12 @@ from time import perf_counter_ns
 
 import numpy as np
 from pelorus import Calibration, Filter, observations
-from pelorus.frames import Config, Header, Message, Report, Stereo, Truth, Twist
-from pelorus.layout import Floats
-from pelorus.replay import find_programs
-from pelorus.schema import SETTINGS
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of
+from pelorus.native.replay import find_programs
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Config, Header, Message, Report, Stereo, Truth, Twist
+from pelorus.wire.framing import messages_of
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import SETTINGS
 
 SLOTS = 50
 

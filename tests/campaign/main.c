@@ -70,7 +70,7 @@ static bool take_number(options *o, const char *option, const char *value) {
 }
 
 static void list_limits(void) {
-    for (unsigned i = 0; plr_limit_at(i); i++)
+    for (unsigned i = 0; i < PLR_RULES; i++)
         printf("%-20s %8g %s: %s\n", plr_limit_at(i)->name, plr_limit_at(i)->value,
                plr_limit_at(i)->unit, plr_limit_at(i)->about);
 }
@@ -83,7 +83,7 @@ static uint64_t limits_named(const char *names) {
         while (plr_limit_at(row) && (strlen(plr_limit_at(row)->name) != length ||
                                      memcmp(plr_limit_at(row)->name, name, length) != 0))
             row++;
-        if (!plr_limit_at(row))
+        if (!plr_limit_at(row) || plr_limit_at(row)->rule)
             refuse("--without", names);
         found |= UINT64_C(1) << row;
         name += length + (name[length] == ',');

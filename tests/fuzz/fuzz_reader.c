@@ -82,6 +82,9 @@ static void require_whole(const plr_reader *r, const plr_message *message) {
     if (message->kind == PLR_KIND_STEREO)
         REQUIRE(message->as.stereo.count <= r->max_observations &&
                 message->as.stereo.observations == r->observations);
+    if (message->kind == PLR_KIND_IMAGE)
+        REQUIRE(message->as.image.count >= 1 && message->as.image.pixels > r->buffer &&
+                message->as.image.pixels + message->as.image.count <= r->buffer + r->length);
     if (message->kind == PLR_KIND_TEXT)
         REQUIRE(memchr(message->as.text.text, 0, PLR_WIRE_MAX_TEXT + 1) != NULL);
     require_comes_back(message);

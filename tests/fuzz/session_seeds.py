@@ -19,8 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pelorus import frames, wire
-from pelorus.frames import (
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire import frames, framing
+from pelorus.wire.frames import (
     Config,
     End,
     Landmark,
@@ -34,9 +36,7 @@ from pelorus.frames import (
     Truth,
     Twist,
 )
-from pelorus.schema import SENSORS
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.wire.schema import SENSORS
 
 Data = Twist | Stereo | Truth
 MOST_SEEN = 8
@@ -80,7 +80,7 @@ def records(messages: Iterable[Message]) -> bytes:
 def stream(messages: Iterable[Message]) -> bytes:
     """As it comes off a wire."""
     out = io.BytesIO()
-    writer = wire.Writer(out)
+    writer = framing.Writer(out)
     for message in messages:
         writer.write(message)
     return out.getvalue()

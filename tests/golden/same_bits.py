@@ -18,8 +18,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from pelorus.frames import Pose
-from pelorus.wire import read_file
+from pelorus.wire.frames import Pose
+from pelorus.wire.framing import read_file
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))

@@ -395,14 +395,14 @@ static void test_slipping_wheels_compute_the_committed_bits(void) {
 
 static void test_an_imu_that_starts_at_rest_computes_the_committed_bits(void) {
     check(&scenarios[5]);
-    TEST_ASSERT_TRUE(filter.source.inertial.started);
+    TEST_ASSERT_TRUE(filter.source.inertial.phase >= PLR_IMU_UNSETTLED);
     TEST_ASSERT_GREATER_THAN_UINT32(20, filter.totals.readings); /* wheel and standstill */
 }
 
 /* And fixes position and heading anew two seconds later. */
 static void test_an_imu_that_starts_in_motion_computes_the_committed_bits(void) {
     check(&scenarios[6]);
-    TEST_ASSERT_TRUE(filter.source.inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(PLR_IMU_SETTLED, filter.source.inertial.phase);
 }
 
 /* The same start, and all but the baseline is estimated on the way. */

@@ -29,7 +29,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from pelorus import Calibration, Filter, observations
-from pelorus.native import Precision
+from pelorus.native.binding import Precision
 from scipy.stats import chi2
 
 Floats = NDArray[np.float64]

@@ -174,7 +174,7 @@ NUMBERS: dict[str, list[Place]] = {
     ],
     "most seconds of twist-delay": [
         (SETTINGS, r'"twist-delay".*NUMBER, NULL, 0, ([\d.e]+),'),
-        ("tools/pelorus/arrivals.py", r"WAIT_MAX_NS = ([\d_]+)", times(1e-9)),
+        ("tools/pelorus/io/arrivals.py", r"WAIT_MAX_NS = ([\d_]+)", times(1e-9)),
     ],
     "default of max-gap": [
         (SETTINGS, r'"max-gap".*NULL, [\d.e-]+, [\d.e-]+, ([\d.e-]+),'),
@@ -182,7 +182,7 @@ NUMBERS: dict[str, list[Place]] = {
     ],
     "rejected landmarks of EVIDENCE": [
         ("include/pelorus/types.h", r"PLR_SUPERVISION_REJECTED = (\d+)"),
-        ("tools/pelorus/native.py", r"REJECTED = (\d+)"),
+        ("tools/pelorus/native/binding.py", r"REJECTED = (\d+)"),
     ],
     "lines of a file": [
         ("tests/layering/shape.py", r"LONGEST_FILE = (\d+)"),

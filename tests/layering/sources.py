@@ -19,12 +19,14 @@ from pathlib import Path
 FOLDERS: dict[str, set[str]] = {
     "math": {"math"},
     "record": {"record"},
+    "limits": {"limits"},
     "state": {"state", "math"},
-    "process": {"process", "state", "math"},
+    "process": {"process", "state", "limits", "math"},
     "sensor": {"sensor", "state", "math"},
-    "supervise": {"supervise", "math"},
+    "supervise": {"supervise", "limits", "math"},
     "known_map": {"known_map", "sensor", "state", "math"},
     "vision": {"vision", "math"},
+    "eyes": {"eyes", "math"},
     "filter": {
         "filter",
         "known_map",
@@ -33,6 +35,7 @@ FOLDERS: dict[str, set[str]] = {
         "process",
         "state",
         "record",
+        "limits",
         "math",
     },
     "absent": {"supervise", "known_map"},
@@ -56,6 +59,7 @@ FILTER_HEADERS = PART_HEADERS | {"state.h", "filter.h", "pelorus.h"}
 HEADERS: dict[str, set[str]] = {
     "math": {"assertions.h", "config.h"},
     "record": FILTER_HEADERS | {"wire.h"},
+    "limits": {"limits.def", "supervisor.h"},
     "state": PART_HEADERS,
     "process": PART_HEADERS,
     "sensor": PART_HEADERS,
@@ -63,18 +67,18 @@ HEADERS: dict[str, set[str]] = {
     "supervise": {
         "assertions.h",
         "config.h",
-        "limits.def",
         "settings.h",
         "supervisor.h",
         "types.h",
     },
     "known_map": PART_HEADERS,
     # Eyes see pictures, and no filter.
-    "vision": {"assertions.h", "config.h", "types.h", "vision.h"},
+    "vision": {"assertions.h", "config.h", "rig.h", "types.h", "vision.h"},
+    "eyes": {"assertions.h", "config.h", "eyes.h"},
     "absent": PART_HEADERS,
     "filter": FILTER_HEADERS,
     "session": FILTER_HEADERS
-    | {"wire.h", "port.h", "session.h", "session_parts.h", "state_store.h"},
+    | {"wire.h", "port.h", "session.h", "session_parts.h", "state_store.h", "eyes.h"},
 }
 # The files of src/session, from the lowest to the highest: each may include those above it here.
 # The first ones are parts, which do not know the session that they are part of.
@@ -89,7 +93,7 @@ SESSION_PARTS = (
     "state_store",
 )
 SESSION_FILES = (
-    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "use", "events"),
+    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "use", "events", "look"),
     "session",
 )
 # What a public header may include of its siblings: wire.h must stay free of the filter.
@@ -107,8 +111,10 @@ SIBLINGS: dict[str, set[str]] = {
     "state.h": PART_HEADERS - {"assertions.h"},
     "filter.h": FILTER_HEADERS - {"filter.h", "pelorus.h"},
     "pelorus.h": FILTER_HEADERS - {"pelorus.h"},
-    "vision.h": {"config.h", "types.h"},
-    "wire.h": {"types.h"},
+    "rig.h": {"types.h"},
+    "vision.h": {"config.h", "rig.h", "types.h"},
+    "wire.h": {"rig.h", "types.h"},
+    "eyes.h": {"vision.h", "wire.h"},
     "port.h": {"types.h"},
     "session_parts.h": {"config.h", "wire.h"},
     "session.h": FILTER_HEADERS | {"wire.h", "port.h", "session_parts.h", "state_store.h"},
@@ -205,6 +211,16 @@ def check_session(root: Path) -> Iterator[Breach]:
                 yield Breach(path, number, "the phase is changed by plr_phase_change alone")
 
 
+def check_imu_phase(root: Path) -> Iterator[Breach]:
+    """One function changes the phase of an IMU's start."""
+    for path in sorted((root / "src").glob("*/*.[ch]")):
+        if path.stem == "imu_phase" or path.parent.name == "session":
+            continue
+        for number, line in code_lines(path):
+            if SETS_PHASE.search(line):
+                yield Breach(path, number, "the phase is changed by plr_imu_phase_change alone")
+
+
 def check_session_table(root: Path) -> Iterator[Breach]:
     """docs/REPLAY-FORMAT.md shows the table of phases and kinds that the session goes by."""
     page = root / "docs" / "REPLAY-FORMAT.md"
@@ -274,6 +290,7 @@ def check_textbook_is_another(root: Path) -> Iterator[Breach]:
 CHECKS = (
     check_layers,
     check_session,
+    check_imu_phase,
     check_session_table,
     check_conditions,
     check_licence_lines,

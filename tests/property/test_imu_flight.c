@@ -17,7 +17,7 @@ static void begin_and_settle(imu_rig_start start, uint64_t seed) {
     imu_rig_begin(start, seed);
     if (start == IMU_RIG_AT_REST)
         imu_rig_fly(12);
-    while (start == IMU_RIG_IN_MOTION && !imu_rig.filter.source.inertial.anchored)
+    while (start == IMU_RIG_IN_MOTION && imu_rig.filter.source.inertial.phase != PLR_IMU_SETTLED)
         imu_rig_fly(1);
     if (start != IMU_RIG_GIVEN)
         imu_rig_adopt_world();

@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 import pytest
 from converted import Converted, Once
 from flight_logs import Compare, robots_log
-from pelorus.cli import main
-from pelorus.converters import ece276a, imu_npz
+from pelorus.commands.cli import main
+from pelorus.converters import imu_npz
 from pelorus.converters.imu_npz import Choices
-from pelorus.frames import Message
 from pelorus.robot import stream
+from pelorus.wire.frames import Message
+from pelorus_course import ece276a
 from replay_drive import BIN, Record, drive, encode, recorder
 
 ROOT = Path(__file__).resolve().parents[2]

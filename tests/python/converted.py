@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pelorus import wire
 from pelorus.faults.finding import Finding
-from pelorus.frames import Message
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire import framing
+from pelorus.wire.frames import Message
 
 Run = Callable[..., Any]  # the fixture `pelorus`
 Once = Callable[[str, Callable[[Path], object]], Path]  # the fixture `once`
@@ -27,7 +27,7 @@ class Converted(NamedTuple):
 
 def messages_of(path: Path, kind: type[Message]) -> list[Any]:
     """The messages of one kind in a whole, undamaged recording."""
-    received, counts = wire.read_file(path)
+    received, counts = framing.read_file(path)
     assert counts.clean
     assert counts.ended
     return [frame.message for frame in received if isinstance(frame.message, kind)]

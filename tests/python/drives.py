@@ -8,11 +8,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from pelorus import se3
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.tracks import Tracks, project, triangulate
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks, project, triangulate
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.simulate.simulate import Options, simulate
 from scipy.spatial.transform import Rotation
 
 FORWARD_RIGHT_DOWN = np.diag([1.0, -1.0, -1.0])

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pelorus.frames import Camera, Header, Noise, TwistTiming
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.tracks import Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Camera, Header, Noise, TwistTiming
 from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]

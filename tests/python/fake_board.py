@@ -14,8 +14,8 @@ import tty
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from pelorus.frames import Config, End, Kind, Message, Pose, Report, Stereo, Text
-from pelorus.wire import Reader, encode
+from pelorus.wire.frames import Config, End, Kind, Message, Pose, Report, Stereo, Text
+from pelorus.wire.framing import Reader, encode
 
 STOP_S = 0.02  # how often it looks whether it is to stop
 FULL = -10  # plr_status

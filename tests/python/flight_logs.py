@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pelorus.frames import Kind, Message
+from pelorus.wire.frames import Kind, Message
 from replay_drive import encode, log_of, run, t_ns
 
 SAME, DIFFERENT, NOT_COMPARABLE = 0, 1, 2

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 from drives import PERFECT
-from pelorus import se3
-from pelorus.simulation.imu import ImuFaults, SimulatedImu
-from pelorus.simulation.simulate import Options, Simulation, simulate
+from pelorus.math import se3
+from pelorus.simulate.imu import ImuFaults, SimulatedImu
+from pelorus.simulate.simulate import Options, Simulation, simulate
 from scipy.spatial.transform import Rotation
 
 EXACT = SimulatedImu(

@@ -17,14 +17,15 @@ from pathlib import Path
 import numpy as np
 from everyday import drawn, drive
 from injected_known import Known
-from pelorus import se3, wire
 from pelorus.check.contents import recording_of
 from pelorus.faults.fault import Fault
 from pelorus.faults.handeye import first_part
 from pelorus.faults.named import faults_in, judged_of
-from pelorus.frames import Message, Stereo, Twist
-from pelorus.recording import Recording
-from pelorus.tracks import project, triangulate
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import project, triangulate
+from pelorus.math import se3
+from pelorus.wire import framing
+from pelorus.wire.frames import Message, Stereo, Twist
 
 PIECE = 300  # frames of a clean piece
 
@@ -315,7 +316,7 @@ def recordings(words: list[str]) -> Iterator[tuple[str, Recording]]:
                 settings = drawn(seed)
                 yield f"{seed} ({settings.kind})", drive(settings, seed)
         else:
-            yield word, recording_of(wire.messages_of(Path(word)))
+            yield word, recording_of(framing.messages_of(Path(word)))
 
 
 def clean_pieces(name: str, whole: Recording) -> tuple[int, int]:

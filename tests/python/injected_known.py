@@ -23,7 +23,7 @@ from pelorus.faults.moving import moving
 from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import two_views
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus import se3
-from pelorus.frames import Imu, Message, Stereo
 from pelorus.live import camera as adapters
 from pelorus.live.camera import Asked, Measured
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig.read import Calibrated
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Imu, Message, Stereo
 
 Step = Measured | Callable[[], None]
 

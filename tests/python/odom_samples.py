@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from pelorus import se3
-from pelorus.frames import Stereo, Twist
-from pelorus.layout import Floats
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.online.drive import Setup
 from pelorus.online.odometry import Given, Odometry
-from pelorus.se3 import Poses
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Stereo, Twist
+from pelorus.wire.layout import Floats
 from pelorus_ros import conventions
 from scipy.spatial.transform import Rotation
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pelorus import se3
-from pelorus.se3 import Poses
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from rigs import Cameras, lens
 
 Gray = NDArray[np.uint8]

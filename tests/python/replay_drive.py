@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus import wire
-from pelorus.evaluation import judge
-from pelorus.frames import (
+from pelorus.evaluate.evaluation import judge
+from pelorus.wire import framing
+from pelorus.wire.frames import (
     Camera,
     End,
     Header,
@@ -33,7 +33,7 @@ from pelorus.frames import (
     Truth,
     Twist,
 )
-from pelorus.settings import CALIBRATION_SIGMAS
+from pelorus.wire.settings import CALIBRATION_SIGMAS
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("PELORUS_BIN", ROOT / "build" / "bin"))
@@ -118,7 +118,7 @@ def later(message: Message, seconds: int) -> Twist | Truth | Stereo:
 def encode(messages: Iterable[Message], end: bool | End = True) -> bytes:
     """The bytes of a recording; `end` may be the END that a robot has said."""
     stream = io.BytesIO()
-    writer = wire.Writer(stream)
+    writer = framing.Writer(stream)
     for message in messages:
         writer.write(message)
     if end:
@@ -205,7 +205,7 @@ def recorder(folder: Path) -> Record:
 
 def log_of(path: Path) -> list[Message]:
     """The messages of an undamaged recording."""
-    received, counts = wire.read_file(path)
+    received, counts = framing.read_file(path)
     assert counts.clean
     return [frame.message for frame in received]
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 from pelorus.errors import PelorusError
-from pelorus.frames import Message
-from pelorus.replay import Programs, find_programs
+from pelorus.native.replay import Programs, find_programs
 from pelorus.report.comparison import Comparison
 from pelorus.report.results import carry_out, plan_runs, read_subject
+from pelorus.wire.frames import Message
 from replay_drive import BIN, encode
 
 SETTINGS = ("--pixel-sigma", "0.5")

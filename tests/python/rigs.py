@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pelorus import se3
-from pelorus.se3 import Poses
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace as Fields
 from typing import Any
 
 import numpy as np
-from pelorus.frames import Camera, Header, Imu, Message, Stereo, Twist
+from pelorus.wire.frames import Camera, Header, Imu, Message, Stereo, Twist
 from pelorus_ros.conventions import quaternion
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options

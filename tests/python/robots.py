@@ -14,12 +14,12 @@ import numpy as np
 from everyday import LOOKS_AHEAD, ONE_S, Settings, tracks_of, waves
 from numpy.typing import NDArray
 from pelorus.converters.streams import RawTracks, Readings, Streams, Twists
-from pelorus.frames import Camera, Header, Noise, TwistTiming
-from pelorus.inertial import GRAVITY_MPS2, Inertial
+from pelorus.io.trajectory import Trajectory
+from pelorus.math.inertial import GRAVITY_MPS2, Inertial
+from pelorus.math.se3 import Poses
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.read import Calibrated
-from pelorus.se3 import Poses
-from pelorus.trajectory import Trajectory
+from pelorus.wire.frames import Camera, Header, Noise, TwistTiming
 from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]

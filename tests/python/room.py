@@ -14,8 +14,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pelorus import se3
-from pelorus.se3 import Poses
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from rendered import BEGIN_NS, HEIGHT, WIDTH, rays_of, texture, write_picture
 from rigs import IMU_NOISE, Cameras, camchain, write_yaml
 from scipy.spatial.transform import Rotation

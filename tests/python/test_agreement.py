@@ -12,7 +12,6 @@ from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import OF_RECORDINGS
-from pelorus import se3
 from pelorus.faults import geometry
 from pelorus.faults.agreement import Agreement, agreement
 from pelorus.faults.amounts import of_clock, of_lever, of_scale
@@ -23,10 +22,11 @@ from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
 from pelorus.faults.seen import CameraMotion
 from pelorus.faults.two_views import TwoViews, two_views
-from pelorus.recording import Recording
-from pelorus.second_view import NOISE, inverse
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.tracks import Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math import se3
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.tracking.second_view import NOISE, inverse
 
 DRIVE = Options(
     duration_s=30.0, twist_rate_hz=50.0, bias_velocity_sigma_mps=0.0, loss=0.03, baseline_m=0.4

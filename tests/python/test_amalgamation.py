@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from draws import draws
-from pelorus.cli import main
+from pelorus.commands.cli import main
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,7 +11,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pelorus import se3, wire
 from pelorus.check import halves_alike
 from pelorus.check.apart import HalvesApart, Inflated, Parts, compare, halves, of_points, windows
 from pelorus.check.contents import recording_of, write
@@ -19,10 +18,12 @@ from pelorus.check.options import Settings, options_of
 from pelorus.check.outcome import NOTHING, Bench
 from pelorus.check.parameters import Tuned, larger
 from pelorus.check.tracks_noise import TrackNoise
-from pelorus.evaluation import judge
-from pelorus.frames import Header, Kind, Message, Start, Stereo, Twist
-from pelorus.replay import replayed
-from pelorus.trajectory import Trajectory
+from pelorus.evaluate.evaluation import judge
+from pelorus.io.trajectory import Trajectory
+from pelorus.math import se3
+from pelorus.native.replay import replayed
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Kind, Message, Start, Stereo, Twist
 from replay_drive import EXACT_CAMERA, drive, header
 from report_runs import built_programs
 
@@ -35,7 +36,7 @@ Pixels = NDArray[np.float64]
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> list[Message]:
     """Twenty seconds of a drive whose twists are poor and whose pixels are good."""
     built_programs()
-    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+    from pelorus.commands.cli import main  # noqa: PLC0415 - typer is slow to load
 
     path = tmp_path_factory.mktemp("apart") / "drive.plr"
     twists = ("--velocity-sigma", "0.3", "--gyro-sigma", "0.03", "--twist-rate", "10")
@@ -43,7 +44,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> list[Message]:
     drive = ("--seed", "3", "--duration", "20", "--baseline", "0.4", "--speed", "5")
     pixels = ("--pixel-sigma", str(SIGMA_PX), "--loss", "0.03")
     assert main(["simulate", str(path), *drive, *twists, *biases, *pixels]) == 0
-    return [m for m in wire.messages_of(path) if m.kind != Kind.END]
+    return [m for m in framing.messages_of(path) if m.kind != Kind.END]
 
 
 def moved(messages: list[Message], by: Callable[[Stereo], Pixels]) -> list[Message]:
@@ -133,15 +134,15 @@ def test_no_noises_are_written_where_the_factor_that_is_due_does_not_do(
 
 
 def test_halves_of_a_drive_by_an_imu_are_compared_over_the_whole_of_it(tmp_path: Path) -> None:
-    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+    from pelorus.commands.cli import main  # noqa: PLC0415 - typer is slow to load
 
     path = tmp_path / "flown.plr"
     rates = ("--seed", "300", "--duration", "25", "--lap", "8", "--imu-rate", "200")
     noise = ("--pixel-sigma", "1", "--gyro-noise", "0.002", "--accel-noise", "0.03")
     assert main(["simulate", str(path), *rates, *noise, "--observations", "30"]) == 0
-    flown = [m for m in wire.messages_of(path) if m.kind != Kind.END]
+    flown = [m for m in framing.messages_of(path) if m.kind != Kind.END]
     program = built_programs().float32
-    header_of = wire.header_of_messages(flown)
+    header_of = framing.header_of_messages(flown)
 
     def of(times: float) -> Settings:
         return larger(header_of, {}, True, times)

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from converted import Once, Run
-from pelorus.calibrated import PARTS, Calibrated, last_calibrated
-from pelorus.cli import main
-from pelorus.frames import End, Header
-from pelorus.settings import IDS, describe
-from pelorus.wire import messages_of, write_file
+from pelorus.commands.cli import main
+from pelorus.wire.calibrated import PARTS, Calibrated, last_calibrated
+from pelorus.wire.frames import End, Header
+from pelorus.wire.framing import messages_of, write_file
+from pelorus.wire.settings import IDS, describe
 from replay_drive import BIN
 
 REPLAY = BIN / "pelorus-replay"

@@ -25,12 +25,12 @@ from pelorus.faults.seen import CameraMotion as SeenMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import two_views
 from pelorus.faults.world_axes import world_axes
-from pelorus.foreign import ForeignFileError
-from pelorus.inertial import Inertial
-from pelorus.recording import Recording
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math.inertial import Inertial
 from pelorus.rig.read import Calibrated
-from pelorus.simulation.simulate import simulate
-from pelorus.tracks import Tracks
+from pelorus.simulate.simulate import simulate
 
 Floats = NDArray[np.float64]
 

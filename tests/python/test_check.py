@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from converted import Run
 from draws import long_run
-from pelorus import inertial, wire
 from pelorus.check import (
     clock,
     outcome,
@@ -30,7 +29,11 @@ from pelorus.check.contents import first_frames, half, recording_of, shifted, wr
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
 from pelorus.errors import PelorusError
-from pelorus.frames import (
+from pelorus.io.tracks import Tracks
+from pelorus.math import inertial
+from pelorus.math.inertial import Inertial
+from pelorus.wire import framing
+from pelorus.wire.frames import (
     Header,
     Imu,
     Kind,
@@ -42,8 +45,6 @@ from pelorus.frames import (
     Stereo,
     Twist,
 )
-from pelorus.inertial import Inertial
-from pelorus.tracks import Tracks
 from replay_drive import BIN, CAMERA, drive, header
 from report_runs import built_programs
 
@@ -53,7 +54,7 @@ MS = 1_000_000
 def simulate(tmp_path_factory: pytest.TempPathFactory, *options: str) -> Path:
     """A recording for the whole module."""
     built_programs()
-    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+    from pelorus.commands.cli import main  # noqa: PLC0415 - typer is slow to load
 
     path = tmp_path_factory.mktemp("check") / "drive.plr"
     assert main(["simulate", str(path), *options]) == 0
@@ -101,7 +102,7 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
 
 
 def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) -> None:
-    messages = wire.messages_of(simulated)
+    messages = framing.messages_of(simulated)
     late = tmp_path / "late.plr"
     write(late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS))
     bench = Bench(built_programs().float32, late, tmp_path)
@@ -135,7 +136,7 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
     flown: Path, tmp_path: Path, pelorus: Run
 ) -> None:
     early = tmp_path / "early.plr"
-    messages = [m for m in wire.messages_of(flown) if m.kind not in (Kind.END, Kind.TRUTH)]
+    messages = [m for m in framing.messages_of(flown) if m.kind not in (Kind.END, Kind.TRUTH)]
     write(early, shifted(messages, -20 * MS))
     wrong = {"pixel-sigma": "2", "gyro-noise": "0.0005", "accel-noise": "0.3"}
     sets = [word for name, value in wrong.items() for word in ("--set", f"{name}={value}")]
@@ -201,7 +202,7 @@ def test_every_offset_of_an_imu_is_judged_by_the_same_frames(flown: Path, tmp_pa
 
 
 def test_a_batch_of_readings_does_not_reach_over_a_frame_that_was_moved(flown: Path) -> None:
-    messages = shifted(first_frames(wire.messages_of(flown), 30), 33 * MS)
+    messages = shifted(first_frames(framing.messages_of(flown), 30), 33 * MS)
     newest = 0
     for message in messages:
         if isinstance(message, Imu):
@@ -209,7 +210,7 @@ def test_a_batch_of_readings_does_not_reach_over_a_frame_that_was_moved(flown: P
             newest = message.times_ns[-1]
         elif isinstance(message, Stereo):
             assert newest <= message.t_ns
-    given = [t for m in wire.messages_of(flown) if isinstance(m, Imu) for t in m.times_ns]
+    given = [t for m in framing.messages_of(flown) if isinstance(m, Imu) for t in m.times_ns]
     kept = [t for m in messages if isinstance(m, Imu) for t in m.times_ns]
     assert kept == given[: len(kept)]
 
@@ -259,7 +260,7 @@ def report(t: int, **counts: float) -> Report:
 
 
 def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
-    from pelorus.frames import Pose  # noqa: PLC0415 - only here
+    from pelorus.wire.frames import Pose  # noqa: PLC0415 - only here
 
     good = report(1, matched=10, used=10, innovation_rows=30, innovation_d2=30.0)
     pose = Pose(1, after_stereo=True)

@@ -17,11 +17,11 @@ from pelorus.check.calibration import CalibrationDoubts
 from pelorus.check.estimated import Estimated, estimated, without_clock
 from pelorus.check.mount import Turned
 from pelorus.check.verdict import Grade
-from pelorus.cli import main
-from pelorus.frames import Header, Message
-from pelorus.layout import Floats
-from pelorus.replay import replayed
-from pelorus.wire import messages_of
+from pelorus.commands.cli import main
+from pelorus.native.replay import replayed
+from pelorus.wire.frames import Header, Message
+from pelorus.wire.framing import messages_of
+from pelorus.wire.layout import Floats
 from report_runs import built_programs
 
 TURNED_RAD = np.radians(1.0)

@@ -14,12 +14,12 @@ from pelorus.check import wheels
 from pelorus.check.verdict import Grade, Remark
 from pelorus.explain import explain
 from pelorus.explain.incident import Cause
-from pelorus.frames import Reading
-from pelorus.recording import Recording
-from pelorus.replay import replayed
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.readings import Sensing
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.io.recording import Recording
+from pelorus.native.replay import replayed
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.readings import Sensing
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Reading
 from replay_drive import BIN
 
 HALF_M = 0.25  # of the track

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from converted import Run
 from drives import clean
-from pelorus import __version__, replay, wire
-from pelorus.cli import COMMANDS
+from pelorus import __version__
+from pelorus.commands.cli import COMMANDS
 from pelorus.errors import write_text
-from pelorus.frames import End, Header, Stereo, Truth, Twist
+from pelorus.native import replay
+from pelorus.wire import framing
+from pelorus.wire.frames import End, Header, Stereo, Truth, Twist
 
 SUBCOMMANDS = [
     ("convert",),
@@ -70,7 +72,7 @@ BLOCKED = """
 import sys
 for name in {names!r}:
     sys.modules[name] = None  # importing it raises ImportError, as where there is none
-from pelorus.cli import main
+from pelorus.commands.cli import main
 for command in {commands!r}:
     assert main([*command, "--help"]) == 0, command
 """
@@ -114,7 +116,7 @@ def test_the_replay_is_found_beside_the_package_from_any_folder(
 def test_a_recording_is_written_in_the_order_of_the_format(tmp_path: Path) -> None:
     path = tmp_path / "x.plr"
     clean(duration_s=3.0).write(path)
-    received, counts = wire.read_file(path)
+    received, counts = framing.read_file(path)
     messages = [frame.message for frame in received]
     assert isinstance(messages[0], Header)
     assert isinstance(messages[-1], End)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pelorus import cobs
+from pelorus.wire import cobs
 
 VECTORS = [  # those of the encoding's description: zeros, runs, and the edges of a full block
     (b"", b"\x01"),

@@ -28,9 +28,9 @@ from flight_logs import (
 )
 from pelorus import ARITHMETIC, __version__
 from pelorus.flight.judge import fingerprint
-from pelorus.frames import NO_BUDGET, Config, Kind, Message, Pose, Report, Stereo, Text, Twist
 from pelorus.robot.status import condition
-from pelorus.schema import HEALTHS, REASONS, STATUSES
+from pelorus.wire.frames import NO_BUDGET, Config, Kind, Message, Pose, Report, Stereo, Text, Twist
+from pelorus.wire.schema import HEALTHS, REASONS, STATUSES
 from replay_drive import BIN, FRAMES, drive, encode, header, known
 
 ROOT = Path(__file__).resolve().parents[2]

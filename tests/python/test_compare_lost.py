@@ -18,7 +18,8 @@ from flight_logs import (
     robots_log,
     without,
 )
-from pelorus.frames import (
+from pelorus.robot.stream import start_from
+from pelorus.wire.frames import (
     End,
     Kind,
     Message,
@@ -31,7 +32,6 @@ from pelorus.frames import (
     Text,
     Twist,
 )
-from pelorus.robot.stream import start_from
 from replay_drive import FRAMES, drive, encode, header, t_ns
 
 DAMAGED, NOT_READY, FOREIGN = -15, -13, -16  # plr_status

@@ -13,9 +13,9 @@ import pytest
 from converted import Run, messages_of
 from drives import clean
 from imu_drives import NOISY, options
-from pelorus.frames import Header, Process, Reading, Stereo
-from pelorus.recording import Recording
-from pelorus.simulation.simulate import simulate
+from pelorus.io.recording import Recording
+from pelorus.simulate.simulate import simulate
+from pelorus.wire.frames import Header, Process, Reading, Stereo
 from replay_drive import BIN
 from rigs import IMU_NOISE, write_yaml
 from scipy.spatial.transform import Rotation

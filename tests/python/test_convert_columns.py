@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from converted import SHORT, Run, messages_of
 from drives import PERFECT, clean
-from pelorus import arrays
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Imu, Process, Reading, Stereo, Truth, Twist
-from pelorus.recording import Recording
-from pelorus.simulation.simulate import simulate
+from pelorus.io import arrays
+from pelorus.io.recording import Recording
+from pelorus.simulate.simulate import simulate
+from pelorus.wire.frames import Header, Imu, Process, Reading, Stereo, Truth, Twist
 from replay_drive import BIN, judged
 from scipy.spatial.transform import Rotation
 from test_convert_csv import csv_files, refusal_of_twists, write_csv

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from converted import SHORT, Run, messages_of
 from drives import clean, with_turned_axes
-from pelorus import se3
 from pelorus.converters import csv as csv_converter
-from pelorus.frames import BodyAxes, Header, Stereo, Truth, Twist, TwistTiming
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.tracks import project, triangulate
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import project, triangulate
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import BodyAxes, Header, Stereo, Truth, Twist, TwistTiming
 from rigs import Cameras, camchain, write_yaml
 from scipy.spatial.transform import Rotation
 

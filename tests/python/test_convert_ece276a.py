@@ -17,11 +17,22 @@ from drives import (
     with_stale_tracks,
     with_turned_axes,
 )
-from pelorus import se3
-from pelorus.converters import ece276a, twist_noise
-from pelorus.frames import BodyAxes, Header, Noise, Start, Stereo, Text, Truth, Twist, TwistTiming
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
+from pelorus.converters import twist_noise
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import (
+    BodyAxes,
+    Header,
+    Noise,
+    Start,
+    Stereo,
+    Text,
+    Truth,
+    Twist,
+    TwistTiming,
+)
+from pelorus_course import ece276a
 
 
 def save_npz(path: Path, recording: Recording, edition: int = 2021, **changes: Any) -> Path:

@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 import pytest
 from converted import Run, messages_of
-from pelorus import se3
-from pelorus.frames import Header, Imu, Process, Stereo, Truth, Twist
-from pelorus.se3 import Poses
+from pelorus.io.tracks import triangulate
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.tracking import images
-from pelorus.tracks import triangulate
+from pelorus.wire.frames import Header, Imu, Process, Stereo, Truth, Twist
 from rendered import BEGIN_NS, FRAMES, HEIGHT, SPEED_MPS, WIDTH, Scene, write_picture
 from rigs import IMU_NOISE, camchain, matrix, write_yaml
 from scipy.spatial.transform import Rotation

@@ -12,13 +12,24 @@ import numpy as np
 import pytest
 from converted import Converted, Run, messages_of
 from imu_drives import calib, noisy, npz_arrays, written
-from pelorus import evaluation, se3
 from pelorus.converters import imu_npz, renewal
 from pelorus.converters.imu_npz import START_SIGMAS, Choices
-from pelorus.frames import Header, Imu, Process, Start, StartFlag, Stereo, Text, Truth, TruthKnows
-from pelorus.layout import Floats, unpack_symmetric
-from pelorus.recording import Recording
-from pelorus.tracks import Tracks, project
+from pelorus.evaluate import evaluation
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks, project
+from pelorus.math import se3
+from pelorus.wire.frames import (
+    Header,
+    Imu,
+    Process,
+    Start,
+    StartFlag,
+    Stereo,
+    Text,
+    Truth,
+    TruthKnows,
+)
+from pelorus.wire.layout import Floats, unpack_symmetric
 
 
 @pytest.fixture

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from converted import Run, messages_of
 from numpy.typing import NDArray
-from pelorus import se3
-from pelorus.frames import Config, Header, Stereo, Truth, Twist, TwistTiming
-from pelorus.se3 import Poses
-from pelorus.settings import IDS
-from pelorus.tracks import triangulate
+from pelorus.io.tracks import triangulate
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Config, Header, Stereo, Truth, Twist, TwistTiming
+from pelorus.wire.settings import IDS
 from rendered import FRAMES, HEIGHT, RATE_HZ, SPEED_MPS, WIDTH, Scene, write_picture
 from rigs import Cameras
 from scipy.spatial.transform import Rotation

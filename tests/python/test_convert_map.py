@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run
-from pelorus import wire
-from pelorus.frames import BodyAxes, Header, Landmark, Role, Truth, Twist
-from pelorus.layout import unpack_symmetric
+from pelorus.wire import framing
+from pelorus.wire.frames import BodyAxes, Header, Landmark, Role, Truth, Twist
+from pelorus.wire.layout import unpack_symmetric
 from replay_drive import BIN, drive, encode, header, log_of, points, truth
 from replay_drive import run as run_replay
 
@@ -55,8 +55,8 @@ def test_position_and_covariance_arrive_under_their_ids(
     assert (found.id, found.role, found.p_W_m.tolist()) == (2**32 - 1, Role.KNOWN, [1, 2, 3])
     P = unpack_symmetric(found.covariance[None], 3)[0]
     assert P.tolist() == [[0.04, 0.01, -0.02], [0.01, 0.09, 0.003], [-0.02, 0.003, 0.16]]
-    received, counts = wire.read_file(target)
-    theirs, ours = (wire.header_of(wire.read_file(path)[0], path) for path in (like, target))
+    received, counts = framing.read_file(target)
+    theirs, ours = (framing.header_of(framing.read_file(path)[0], path) for path in (like, target))
     assert theirs == ours
     assert counts.ended
     assert len(received) == 3

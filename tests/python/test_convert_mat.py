@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from converted import COUNT, SHORT, Run, messages_of
 from drives import clean, mat_arrays
-from pelorus.converters import matlab
-from pelorus.frames import BodyAxes, Header, Landmark, Role, Stereo, Truth, Twist, TwistTiming
+from pelorus.wire.frames import BodyAxes, Header, Landmark, Role, Stereo, Truth, Twist, TwistTiming
+from pelorus_course import matlab
 from scipy.io import savemat
 
 

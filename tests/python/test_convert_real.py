@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from converted import Converted
 from drives import with_turned_axes
-from pelorus import road, trajectory
-from pelorus.converters import ece276a, matlab
-from pelorus.evaluation import Accuracy, assess
+from pelorus.evaluate import road
+from pelorus.evaluate.evaluation import Accuracy, assess
 from pelorus.faults.mend import mend
-from pelorus.frames import BodyAxes, TwistTiming
-from pelorus.recording import Recording
-from pelorus.trajectory import Trajectory
+from pelorus.io import trajectory
+from pelorus.io.recording import Recording
+from pelorus.io.trajectory import Trajectory
+from pelorus.wire.frames import BodyAxes, TwistTiming
+from pelorus_course import ece276a, matlab
 
 
 def test_0027_has_stale_tracks_and_a_malformed_lever(

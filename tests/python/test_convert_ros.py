@@ -16,15 +16,15 @@ from bags import NS, Recorder
 from converted import SHORT, Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
-from pelorus import se3
 from pelorus.converters import ros, ros_frames
 from pelorus.converters.bag import Bag
 from pelorus.converters.streams import Asked, Pictures
 from pelorus.errors import PelorusError
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Imu, Process, Stereo, Truth, Twist
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Header, Imu, Process, Stereo, Truth, Twist
 from PIL import Image
 from rendered import BEGIN_NS, FRAMES, HEIGHT, SPEED_MPS, WIDTH, Scene
 from rigs import IMU_NOISE, RADTAN, Cameras, camchain, write_yaml

@@ -12,12 +12,12 @@ import pytest
 from converted import Run as Command
 from draws import long_run
 from drives import clean, npz_arrays, with_stale_tracks
-from pelorus import road
-from pelorus.converters import ece276a
-from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo, Truth
+from pelorus.evaluate import road
 from pelorus.report.comparison import traces
-from pelorus.settings import IDS
-from pelorus.wire import messages_of
+from pelorus.wire.frames import Config, Kind, Landmark, Message, Report, Role, Stereo, Truth
+from pelorus.wire.framing import messages_of
+from pelorus.wire.settings import IDS
+from pelorus_course import ece276a
 from PIL import Image
 from replay_drive import BIN, ROOT, drive, encode, header
 from report_runs import built_programs
@@ -188,7 +188,7 @@ def test_two_recordings_of_one_name_are_refused(pelorus: Command, tmp_path: Path
 
 def numbers(line: str) -> dict[str, Any]:
     """A row of table.md by its titles."""
-    from pelorus.course.table import TITLES  # noqa: PLC0415 - matplotlib loads slowly
+    from pelorus_course.table import TITLES  # noqa: PLC0415 - matplotlib loads slowly
 
     return dict(zip(TITLES, (cell.strip() for cell in line.strip("|\n").split("|")), strict=True))
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from pelorus import road
-from pelorus.trajectory import read_stamped
+from pelorus.evaluate import road
+from pelorus.io.trajectory import read_stamped
 from replay_drive import Result, judged, run
 
 SLOTS_MOST = ("100", "256")  # what is lost by eviction is centimetres here

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pelorus.converters.columns import Columns
-from pelorus.foreign import ForeignFileError
-from pelorus.table import Table
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.table import Table
 
 EUROC = "#timestamp [ns],w_RS_S_x [rad s^-1],a_RS_S_x [m s^-2]\n"
 

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from converted import Run
 from numpy.typing import NDArray
-from pelorus import misread, se3
 from pelorus.converters import csv
 from pelorus.converters.columns import Columns
-from pelorus.foreign import ForeignFileError
-from pelorus.se3 import Poses
-from pelorus.trajectory import read_truth
+from pelorus.evaluate import misread
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.trajectory import read_truth
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from scipy.spatial.transform import Rotation
 
 COUNT = 120

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from converted import Run, messages_of
 from drives import clean
-from pelorus import evaluation, road, se3
-from pelorus.consistency import rms
-from pelorus.evaluation import Accuracy, assess
-from pelorus.frames import Header, Truth
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
-from pelorus.trajectory import Trajectory, read_stamped, read_truth
+from pelorus.evaluate import evaluation, road
+from pelorus.evaluate.evaluation import Accuracy, assess
+from pelorus.io.trajectory import Trajectory, read_stamped, read_truth
+from pelorus.math import se3
+from pelorus.math.consistency import rms
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Header, Truth
+from pelorus.wire.layout import Floats
 from replay_drive import BIN
 from scipy.spatial.transform import Rotation
 

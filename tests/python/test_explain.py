@@ -18,23 +18,23 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
-from pelorus import schema
 from pelorus.check import verdict as verdicts
 from pelorus.errors import PelorusError
-from pelorus.evidence import Evidence
 from pelorus.explain import Explanation, explain
 from pelorus.explain.explanation import LINES
 from pelorus.explain.incident import Cause
 from pelorus.explain.log import runs
-from pelorus.frames import Header, Message, Pose, Report, Stereo, Twist
-from pelorus.frames import Imu as ImuReadings
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire import schema
+from pelorus.wire.evidence import Evidence
+from pelorus.wire.frames import Header, Message, Pose, Report, Stereo, Twist
+from pelorus.wire.frames import Imu as ImuReadings
+from pelorus.wire.framing import messages_of
 from replay_drive import ROOT, drive, encode, run
 
 sys.path.insert(0, str(ROOT / "tests" / "recordings"))

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from converted import Run
 from pelorus.converters import landmark_map
-from pelorus.evaluation import made_in
-from pelorus.frame_table import HEALTH
-from pelorus.frames import Landmark, Report, Role
-from pelorus.trajectory import read_stamped
+from pelorus.evaluate.evaluation import made_in
+from pelorus.evaluate.frame_table import HEALTH
+from pelorus.io.trajectory import read_stamped
+from pelorus.wire.frames import Landmark, Report, Role
 from replay_drive import BIN, FRAMES, drive, log_of, points, poses_of, recorder, run
 
 

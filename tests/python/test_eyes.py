@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pelorus import Calibration, FilterError, PelorusError, Tracker
-from pelorus.eyes import PictureFault
 from pelorus.rig.lens import Lens, LensModel
+from pelorus.tracker import PictureFault
 
 WIDTH, HEIGHT, DISPARITY = 160, 120, 7
 CAMERA = Calibration(200.0, 200.0, (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 0.1)

@@ -15,11 +15,13 @@ from drives import (
     with_stale_tracks,
     with_turned_axes,
 )
-from pelorus.faults import axes, lever, stale, timing
+from pelorus.faults import axes, lever, stale
 from pelorus.faults.mend import held_to_fit, mend
-from pelorus.frames import BodyAxes, TwistTiming
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math.axes import FORWARD_LEFT_UP_IN_CAMERA, body_axes, name, turns
+from pelorus.wire.frames import BodyAxes, TwistTiming
+from pelorus.wire.layout import Floats
+from pelorus_course import timing
 
 SEEDS = [1, 2]
 STALE = range(7, 590, 9)
@@ -103,7 +105,7 @@ def test_a_track_that_repeats_alone_is_no_stale_frame() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("F", axes.turns()[1::5], ids=str)
+@pytest.mark.parametrize("F", turns()[1::5], ids=str)
 def test_turned_axes_are_found_and_turned_back(seed: int, F: Floats) -> None:
     recording = clean(seed)
     mended, finding = axes.mend(with_turned_axes(recording, F))
@@ -161,13 +163,13 @@ def test_the_twist_timing_of_the_drive_is_found(given: TwistTiming) -> None:
 
 
 def test_axes_have_names() -> None:
-    R = axes.FORWARD_LEFT_UP_IN_CAMERA
-    assert axes.body_axes(R) is BodyAxes.FORWARD_LEFT_UP
-    assert axes.body_axes(R @ FORWARD_RIGHT_DOWN) is BodyAxes.FORWARD_RIGHT_DOWN
+    R = FORWARD_LEFT_UP_IN_CAMERA
+    assert body_axes(R) is BodyAxes.FORWARD_LEFT_UP
+    assert body_axes(R @ FORWARD_RIGHT_DOWN) is BodyAxes.FORWARD_RIGHT_DOWN
     backward = R @ np.diag([-1.0, -1.0, 1.0])
-    assert axes.body_axes(backward) is BodyAxes.OTHER
-    assert axes.name(backward) == "backward-right-up"
-    turns = axes.turns()
-    assert len({tuple(F.ravel()) for F in turns}) == 24
-    assert np.array_equal(turns[0], np.eye(3))
-    assert all(np.linalg.det(F) > 0 for F in turns)
+    assert body_axes(backward) is BodyAxes.OTHER
+    assert name(backward) == "backward-right-up"
+    found = turns()
+    assert len({tuple(F.ravel()) for F in found}) == 24
+    assert np.array_equal(found[0], np.eye(3))
+    assert all(np.linalg.det(F) > 0 for F in found)

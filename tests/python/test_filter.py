@@ -16,16 +16,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from pelorus import Calibration, Filter, FilterError, KnownLandmark, PelorusError, Reason, native
+from pelorus import Calibration, Filter, FilterError, KnownLandmark, PelorusError, Reason
 from pelorus import observations as frame_of
-from pelorus.cli import main
-from pelorus.frames import Camera, Config, Header, Message, Noise, Pose, Stereo, Truth, Twist
-from pelorus.layout import Floats
-from pelorus.native import Precision
-from pelorus.schema import DEFAULTS, REASON_NAMES, REASONS, SETTINGS
-from pelorus.settings import IDS
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of, write_file
+from pelorus.commands.cli import main
+from pelorus.native import binding
+from pelorus.native.binding import Precision
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Camera, Config, Header, Message, Noise, Pose, Stereo, Truth, Twist
+from pelorus.wire.framing import messages_of, write_file
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import DEFAULTS, REASON_NAMES, REASONS, SETTINGS
+from pelorus.wire.settings import IDS
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -158,14 +159,14 @@ def test_the_structs_are_those_of_the_headers(tmp_path: Path) -> None:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
-    native.library()
+    binding.library()
     members = {"linear": "v_B_mps", "angular": "w_B_radps"}
     lines = []
     expected = []
-    for struct in native.STRUCTS:
+    for struct in binding.STRUCTS:
         plain = type("Plain", (ctypes.Structure,), {"_fields_": struct._fields_})
         for field in struct._fields_:
-            member = members.get(field[0], field[0]) if struct is native.Twist else field[0]
+            member = members.get(field[0], field[0]) if struct is binding.Twist else field[0]
             lines.append(f'printf("%zu\\n", offsetof({struct.c_name}, {member}));')
             expected.append(getattr(plain, field[0]).offset)
     source = tmp_path / "offsets.c"
@@ -266,26 +267,26 @@ def test_a_calibration_that_cannot_be_is_refused() -> None:
 def test_a_package_without_its_library_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    native.library.cache_clear()
+    binding.library.cache_clear()
     try:
         monkeypatch.setenv("PELORUS_BIN", str(tmp_path))
         with pytest.raises(PelorusError, match=r"is in none of .*installed without it"):
             Filter(CAMERA)
-        name = f"pelorus-filter{native.SUFFIXES.get('', '.so')}"
+        name = f"pelorus-filter{binding.SUFFIXES.get('', '.so')}"
         (tmp_path / name).write_bytes(b"\x7fELF of another machine")
         with pytest.raises(PelorusError, match=re.escape(name) + ": cannot be loaded"):
             Filter(CAMERA)
         with pytest.raises(PelorusError, match="precision 'float16': one of float32, float64"):
             Filter(CAMERA, precision="float16")  # type: ignore[arg-type]
     finally:
-        native.library.cache_clear()
+        binding.library.cache_clear()
 
 
 def test_a_library_of_other_structs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    path = native.library()._library._name
-    monkeypatch.setattr(native.Report, "c_name", "plr_frame")
+    path = binding.library()._library._name
+    monkeypatch.setattr(binding.Report, "c_name", "plr_frame")
     with pytest.raises(PelorusError, match=r"with another plr_frame.*build it anew"):
-        native.Library(Path(path))
+        binding.Library(Path(path))
 
 
 def test_ids_of_a_table_of_floats_are_taken() -> None:
@@ -330,9 +331,9 @@ def test_report_health_and_filter_show_what_they_hold() -> None:
     assert "REFUSED_INPUT" in told
     assert ", observations=2, " in told
     assert re.search(r"Health\(health=\w+, reasons=[\w|]+, seconds_without", repr(filter.health()))
-    assert repr(native.Report()).startswith("Report(t_ns=0, status=0, health=good, reasons=none, ")
-    assert "nu=[0.0, 0.0" in repr(native.Supervision())
-    assert repr(native.Setting()).startswith("Setting(id=0, name=None")
+    assert repr(binding.Report()).startswith("Report(t_ns=0, status=0, health=good, reasons=none, ")
+    assert "nu=[0.0, 0.0" in repr(binding.Supervision())
+    assert repr(binding.Setting()).startswith("Setting(id=0, name=None")
 
 
 def seen(points_C: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

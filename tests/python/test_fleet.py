@@ -16,9 +16,8 @@ from pathlib import Path
 import pytest
 from converted import Run
 from draws import LONG
-from pelorus import evaluation
-from pelorus.console import spoken_time
 from pelorus.errors import PelorusError
+from pelorus.evaluate import evaluation
 from pelorus.fleet import cluster, table
 from pelorus.fleet.examine import Work, digest_of_tools, examine
 from pelorus.fleet.journal import Journal
@@ -26,9 +25,10 @@ from pelorus.fleet.page import write_page
 from pelorus.fleet.pieces import in_pieces
 from pelorus.fleet.ranking import rank
 from pelorus.fleet.row import BROKEN, Found, Row
-from pelorus.frames import Stereo
-from pelorus.replay import result_of
-from pelorus.wire import Counts
+from pelorus.native.replay import result_of
+from pelorus.program.console import spoken_time
+from pelorus.wire.frames import Stereo
+from pelorus.wire.framing import Counts
 from replay_drive import BIN
 
 pytest.importorskip("distributed")
@@ -225,7 +225,7 @@ def test_a_long_log_in_pieces_gives_the_same_figures_in_less_memory(
     tmp_path: Path, pelorus: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "long.plr"
-    pelorus("simulate", path, "--duration", 60, "--frozen-from", 50, "--frozen-for", 2)
+    pelorus("simulate", path, "--duration", 24, "--frozen-from", 18, "--frozen-for", 2)
     (found,) = found_in(tmp_path)
 
     def measured(piece_bytes: int) -> tuple[Row, int]:
@@ -236,7 +236,7 @@ def test_a_long_log_in_pieces_gives_the_same_figures_in_less_memory(
         return row, peak
 
     whole, most = measured(1 << 30)
-    parts, least = measured(200_000)
+    parts, least = measured(80_000)
     assert (whole.pieces, parts.pieces) == (1, 9)
     assert least < 0.4 * most
     assert parts.error is None
@@ -246,7 +246,7 @@ def test_a_long_log_in_pieces_gives_the_same_figures_in_less_memory(
     assert parts.first_cause == whole.first_cause == "frozen-picture"
     assert parts.first_s == pytest.approx(whole.first_s)
     monkeypatch.setattr("pelorus.fleet.whole.POSES_MOST", 100)
-    thinned, _ = measured(200_000)
+    thinned, _ = measured(80_000)
     assert 50 <= (thinned.truth_frames or 0) <= 100
     assert thinned.ate_m == pytest.approx(whole.ate_m, rel=0.2)
     counts = Counts()

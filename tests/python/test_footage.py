@@ -16,14 +16,14 @@ import pytest
 from chromium import Tab, tab
 from converted import Run as Command
 from numpy.typing import NDArray
-from pelorus.evidence import Evidence
 from pelorus.explain import explain
-from pelorus.frames import Header, Message, Stereo
 from pelorus.report.footage import MOMENTS_MOST, WIDTH_PX, footage
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of, write_file
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.evidence import Evidence
+from pelorus.wire.frames import Header, Message, Stereo
+from pelorus.wire.framing import messages_of, write_file
 from PIL import Image
 from replay_drive import run
 

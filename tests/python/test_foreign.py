@@ -17,11 +17,11 @@ import pelorus
 import pytest
 from converted import SHORT, Run, messages_of
 from drives import clean, mat_arrays, npz_arrays
-from pelorus import foreign
-from pelorus.arrays import read_mat
 from pelorus.errors import write_text
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import NAME_BYTES_MAX, Header, header_name
+from pelorus.io import foreign
+from pelorus.io.foreign import ForeignFileError
+from pelorus.wire.frames import NAME_BYTES_MAX, Header, header_name
+from pelorus_course.mat import mat, read_mat
 from scipy.io import loadmat, savemat
 
 DAMAGES = 300
@@ -132,7 +132,7 @@ def test_pickled_objects_are_refused(tmp_path: Path) -> None:
 def test_damage_anywhere_is_refused_or_read_and_never_something_else(
     tmp_path: Path, good_npz: Path, good_mat: Path, form: str
 ) -> None:
-    source, read = (good_npz, foreign.npz) if form == "npz" else (good_mat, foreign.mat)
+    source, read = (good_npz, foreign.npz) if form == "npz" else (good_mat, mat)
     chance, path, failed = random.Random(1), tmp_path / f"damaged.{form}", 0
     for _ in range(DAMAGES):
         content = bytearray(source.read_bytes())
@@ -159,14 +159,14 @@ def test_a_mat_file_is_read_as_scipy_reads_it(tmp_path: Path) -> None:
     path = tmp_path / "x.mat"
     for packed in (False, True):
         savemat(path, written, do_compression=packed)
-        assert_same_arrays(foreign.mat(path), path)
+        assert_same_arrays(mat(path), path)
 
 
 @pytest.mark.parametrize(
     "name", ["klt/2011_09_26_drive_0001_sync_KLT.mat", "starry-night/dataset3.mat"]
 )
 def test_a_real_mat_file_is_read_as_scipy_reads_it(real: Callable[[str], Path], name: str) -> None:
-    assert_same_arrays(foreign.mat(real(name)), real(name))
+    assert_same_arrays(mat(real(name)), real(name))
 
 
 def test_what_holds_no_numbers_is_told_as_such(tmp_path: Path) -> None:
@@ -181,12 +181,12 @@ def test_what_holds_no_numbers_is_told_as_such(tmp_path: Path) -> None:
 def test_another_version_of_mat_is_told(tmp_path: Path) -> None:
     path = tmp_path / "x.mat"
     savemat(path, {"a": np.ones((20, 20))}, format="4")
-    assert "not that of a MATLAB file of version 5 to 7" in refused(path, foreign.mat).wrong
+    assert "not that of a MATLAB file of version 5 to 7" in refused(path, mat).wrong
     path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(384) + b"\x89HDF\r\n")
-    assert "save it with -v7" in refused(path, foreign.mat).expected
+    assert "save it with -v7" in refused(path, mat).expected
 
 
-@pytest.mark.parametrize("read", [foreign.npz, foreign.mat])
+@pytest.mark.parametrize("read", [foreign.npz, mat])
 def test_a_folder_and_nothing_at_all_are_no_arrays(
     tmp_path: Path, read: Callable[[Path], Any]
 ) -> None:
@@ -290,8 +290,8 @@ OPENS = re.compile(
 # What they open is the project's own: recordings, settings, results of its replay, its build, its
 # devices.
 OWN = (
-    *("check/contents.py", "errors.py", "wire.py"),
-    *("packed_file.py", "report/page.py", "replay.py", "schema.py"),
+    *("check/contents.py", "errors.py", "wire/framing.py"),
+    *("wire/packed_file.py", "report/page.py", "native/replay.py", "wire/schema.py"),
     *("robot/emulator.py", "robot/serial.py"),
     *("fleet/examine.py", "fleet/journal.py"),
 )
@@ -309,4 +309,4 @@ def test_foreign_files_are_opened_in_one_place() -> None:
         for path in package.rglob("*.py")
         if OPENS.search(path.read_text(encoding="utf-8"))
     }
-    assert opening == {"foreign.py", BAGS, TRY, *OWN}
+    assert opening == {"io/foreign.py", BAGS, TRY, *OWN}

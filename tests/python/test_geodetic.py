@@ -17,9 +17,9 @@ from pelorus.converters.columns import Columns
 from pelorus.converters.csv import truth_of
 from pelorus.converters.geodetic import Ground
 from pelorus.errors import PelorusError
-from pelorus.frames import BodyAxes, Reading
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
+from pelorus.io.recording import Recording
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import BodyAxes, Reading
 from replay_drive import run
 from scipy.spatial.transform import Rotation
 from test_convert_csv import csv_files

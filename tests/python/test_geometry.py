@@ -6,12 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drives import clean
-from pelorus import motion, se3, visual_motion
-from pelorus.frames import Camera, Header, Stereo, TwistTiming
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.second_view import linearised, measured, predicted
-from pelorus.tracks import Tracks, point_jacobian, project, triangulate
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks, point_jacobian, project, triangulate
+from pelorus.math import motion, se3
+from pelorus.math.se3 import Poses
+from pelorus.tracking import visual_motion
+from pelorus.tracking.second_view import linearised, measured, predicted
+from pelorus.wire.frames import Camera, Header, Stereo, TwistTiming
 from scipy.linalg import expm
 
 CAMERA = Camera(500.0, 480.0, 320.0, 240.0, 0.3)

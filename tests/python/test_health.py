@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from pelorus import schema
-from pelorus.frames import Kind, Report
-from pelorus.health import HARMLESS, SHORT, Spell, TimeLine, reasons, time_line
+from pelorus.evaluate.health import HARMLESS, SHORT, Spell, TimeLine, reasons, time_line
+from pelorus.wire import schema
+from pelorus.wire.frames import Kind, Report
 
 MS = 1_000_000
 

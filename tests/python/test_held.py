@@ -16,11 +16,11 @@ from pelorus.check.held import held_against
 from pelorus.check.outcome import NOTHING, Outcome
 from pelorus.check.parameters import Tuned, larger
 from pelorus.check.tracks_noise import TrackNoise
+from pelorus.evaluate.frame_table import FrameTable
+from pelorus.evaluate.health import TimeLine
 from pelorus.faults.fault import Fault
-from pelorus.frame_table import FrameTable
-from pelorus.frames import Kind, Report
-from pelorus.health import TimeLine
-from pelorus.schema import HEALTHS, number
+from pelorus.wire.frames import Kind, Report
+from pelorus.wire.schema import HEALTHS, number
 from replay_drive import header
 
 WHITE, DRIFTS = TrackNoise({1: 1.0, 5: 1.0}, 1.0), TrackNoise({1: 0.3, 5: 0.6}, 1.63)

@@ -14,7 +14,7 @@ from conftest import ROOT
 from converted import Run
 from draws import draws, long_run
 from imu_drives import noisy
-from pelorus.replay import run_program
+from pelorus.native.replay import run_program
 from replay_drive import BIN
 
 CONFIG = ROOT / "tools" / "config"

@@ -15,10 +15,10 @@ from injected import OF_IMU
 from pelorus.faults.imu_axes import Matrix
 from pelorus.faults.mend import held_to_fit
 from pelorus.faults.named import faults_in
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.simulation import drive as way
-from pelorus.simulation.simulate import Simulation, simulate
+from pelorus.io.recording import Recording
+from pelorus.simulate import drive as way
+from pelorus.simulate.simulate import Simulation, simulate
+from pelorus.wire.layout import Floats
 
 
 def driven() -> Simulation:

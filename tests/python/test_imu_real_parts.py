@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 from imu_drives import NOISY, options
-from pelorus.frames import Kind, Message, Report
-from pelorus.health import NOT_STARTED, time_line
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.schema import number
-from pelorus.simulation.imu import ImuFaults, StartGiven
-from pelorus.simulation.simulate import simulate
+from pelorus.evaluate.health import NOT_STARTED, time_line
+from pelorus.io.recording import Recording
+from pelorus.simulate.imu import ImuFaults, StartGiven
+from pelorus.simulate.simulate import simulate
+from pelorus.wire.frames import Kind, Message, Report
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import number
 from replay_drive import BIN, judged, log_of, run
 
 IMU_FAULT, OFF = number("reason", "IMU_FAULT"), number("reason", "BIAS_OFF_PRIOR")

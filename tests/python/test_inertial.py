@@ -6,13 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from imu_drives import options
-from pelorus import inertial, se3
-from pelorus.frames import IMU_READINGS_MAX, Imu
-from pelorus.inertial import Inertial, MotionState
-from pelorus.motion import Times
-from pelorus.simulation.imu import SimulatedImu as Sensor
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import simulate
+from pelorus.math import inertial, se3
+from pelorus.math.inertial import Inertial, MotionState
+from pelorus.math.motion import Times
+from pelorus.simulate.imu import SimulatedImu as Sensor
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import simulate
+from pelorus.wire.frames import IMU_READINGS_MAX, Imu
 from scipy.linalg import expm
 
 G = np.array([0.0, 0.0, -9.81])

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from converted import Run
 from drives import clean
-from pelorus import wire
-from pelorus.frames import Camera, Config, Header, Kind, Landmark, Message, Stereo, Text, Twist
-from pelorus.settings import SETTINGS, describe
-from pelorus.survey import Gap, survey
-from pelorus.wire import Writer
+from pelorus.evaluate.survey import Gap, survey
+from pelorus.wire import framing
+from pelorus.wire.frames import Camera, Config, Header, Kind, Landmark, Message, Stereo, Text, Twist
+from pelorus.wire.framing import Writer
+from pelorus.wire.settings import SETTINGS, describe
 
 HEADER = Header(Camera(500, 500, 320, 240, 0.2), name="[bold]mine[/]")
 ROOT = Path(__file__).resolve().parents[2]
@@ -173,7 +173,7 @@ def test_observations_without_disparity_or_finite_pixels_are_counted(tmp_path: P
 
 
 def test_random_bytes_never_break_the_reader(tmp_path: Path, pelorus: Run) -> None:
-    good = wire.encode(HEADER, 0) + b"".join(wire.encode(m, 1) for m in twists(0, 10))
+    good = framing.encode(HEADER, 0) + b"".join(framing.encode(m, 1) for m in twists(0, 10))
     path = tmp_path / "x.plr"
     for seed in range(60):
         chance = np.random.default_rng(seed)

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from converted import Converted, Run
 from imu_drives import EXACT, NOISY, options
-from pelorus import inertial_survey
-from pelorus.inertial_survey import Still
-from pelorus.simulation.imu import ImuFaults
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import simulate
+from pelorus.evaluate import inertial_survey
+from pelorus.evaluate.inertial_survey import Still
+from pelorus.simulate.imu import ImuFaults
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import simulate
 
 
 def written(path: Path, faults: ImuFaults | None = None, imu: Any = NOISY, **changes: Any) -> Path:

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from converted import Run
 from flight_logs import DIFFERENT, robots_log
-from pelorus.console import print_json
-from pelorus.frames import Pose
+from pelorus.program.console import print_json
+from pelorus.wire.frames import Pose
 from replay_drive import BIN, FRAMES, drive, encode
 
 

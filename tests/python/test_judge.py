@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus import se3
-from pelorus.consistency import rms
-from pelorus.evaluation import judge, rigid_fit
-from pelorus.frames import UNKNOWN_VARIANCE, Header, Message, Pose, Stereo, Truth
-from pelorus.layout import pack_symmetric
-from pelorus.se3 import Poses
+from pelorus.evaluate.evaluation import judge, rigid_fit
+from pelorus.math import se3
+from pelorus.math.consistency import rms
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import UNKNOWN_VARIANCE, Header, Message, Pose, Stereo, Truth
+from pelorus.wire.layout import pack_symmetric
 
 ONES = np.ones(6)
 IDENTITY = Poses(np.eye(3), np.zeros(3))

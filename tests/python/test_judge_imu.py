@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run
-from pelorus import evaluation, inertial_evaluation, se3
-from pelorus.evaluation import judge
-from pelorus.frames import Config, Header, Message, Pose, Stereo, Truth, TruthKnows
-from pelorus.layout import Floats, pack_symmetric
-from pelorus.se3 import Poses
-from pelorus.settings import IDS
-from pelorus.simulation.scene import CAMERA
+from pelorus.evaluate import evaluation, inertial_evaluation
+from pelorus.evaluate.evaluation import judge
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.simulate.scene import CAMERA
+from pelorus.wire.frames import Config, Header, Message, Pose, Stereo, Truth, TruthKnows
+from pelorus.wire.layout import Floats, pack_symmetric
+from pelorus.wire.settings import IDS
 from replay_drive import BIN, encode
 
 BY_IMU = Config({IDS["process"]: 1.0}, build_fingerprint=1)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pelorus.errors import PelorusError
-from pelorus.frames import UNKNOWN_VARIANCE, Camera, Header, Landmark, Message
-from pelorus.known_map import known_map
-from pelorus.message import Role
-from pelorus.wire import Writer
+from pelorus.io.known_map import known_map
+from pelorus.wire.frames import UNKNOWN_VARIANCE, Camera, Header, Landmark, Message
+from pelorus.wire.framing import Writer
+from pelorus.wire.message import Role
 
 SMALL = np.array([0.01, 0, 0, 0.01, 0, 0.01])
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from converted import Run
-from pelorus import wire
-from pelorus.arrivals import late_ones
-from pelorus.frames import Imu, Kind, Message, Stereo, Twist
+from pelorus.io.arrivals import late_ones
+from pelorus.wire import framing
+from pelorus.wire.frames import Imu, Kind, Message, Stereo, Twist
 from replay_drive import BIN
 
 MS = 1_000_000
@@ -54,7 +54,7 @@ def test_what_stands_behind_newer_ones_is_counted_and_how_long_these_would_wait(
 
 def rebatched(source: Path, target: Path, batch: int, late_s: float) -> None:
     """Each message of `batch` readings behind its last one, as a driver sends it."""
-    messages = [r.message for r in wire.read_file(source)[0] if r.message.kind is not Kind.END]
+    messages = [r.message for r in framing.read_file(source)[0] if r.message.kind is not Kind.END]
     timed = [m for m in messages if isinstance(m, Stereo)]
     imus = [m for m in messages if isinstance(m, Imu)]
     readings = [row for m in imus for row in zip(m.times_ns, m.a_B_mps2, m.w_B_radps, strict=True)]
@@ -67,7 +67,7 @@ def rebatched(source: Path, target: Path, batch: int, late_s: float) -> None:
         arriving.append((times[-1] + late_s * 1e9, 1, Imu(times[0], a, w, period)))
     arriving.sort(key=lambda entry: entry[:2])
     with target.open("wb") as stream:
-        writer = wire.Writer(stream)
+        writer = framing.Writer(stream)
         for message in messages:
             if not isinstance(message, Stereo | Imu):
                 writer.write(message)

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from converted import Run, messages_of
 from pelorus.faults.named import faults_in
-from pelorus.frames import Stereo, Text, Twist
-from pelorus.recording import Recording
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.io.recording import Recording
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Stereo, Text, Twist
 
 READINGS = 6  # by which the gyro is late, 0.12 s
 DRIVE = Options(

@@ -53,7 +53,7 @@ class Interrupt:
         if name == "typer":
             raise KeyboardInterrupt
 sys.meta_path.insert(0, Interrupt())
-from pelorus.cli import main
+from pelorus.commands.cli import main
 sys.exit(main(["info", "x.plr"]))
 """
 

@@ -14,22 +14,22 @@ import numpy as np
 import pytest
 from imu_drives import noisy
 from live_cameras import Scripted, Step, plugged_in, single
-from pelorus import se3
-from pelorus.cli import main
+from pelorus.commands.cli import main
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Imu, Pose, Stereo
+from pelorus.io.recording import Recording
 from pelorus.live.camera import Measured, Picture
 from pelorus.live.intake import Intake
 from pelorus.live.line import HealthLine, News
 from pelorus.live.outputs import as_object
 from pelorus.live.session import CAMERA_FROM_FLU, HERE, How, Session, on_camera
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.online.diagnosis import Level, Status
-from pelorus.recording import Recording
 from pelorus.rig.read import Calibrated
-from pelorus.se3 import Poses
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Header, Imu, Pose, Stereo
+from pelorus.wire.framing import messages_of
 from rendered import SMALL
 from room import Room
 from scipy.spatial.transform import Rotation

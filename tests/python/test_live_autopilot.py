@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus import se3
 from pelorus.errors import PelorusError
-from pelorus.layout import Floats
 from pelorus.live import port
 from pelorus.live.autopilot import COMPONENT, Autopilot, Origin
 from pelorus.live.frd import fields
 from pelorus.live.port import Port, Udp
+from pelorus.math import se3
+from pelorus.math.se3 import IDENTITY, Poses
 from pelorus.online.drive import UNKNOWN_COVARIANCE, Estimate
 from pelorus.online.odometry import Odom
-from pelorus.se3 import IDENTITY, Poses
+from pelorus.wire.layout import Floats
 from scipy.spatial.transform import Rotation
 
 common = pytest.importorskip("pymavlink.dialects.v20.common", reason="pymavlink is not installed")

@@ -14,14 +14,14 @@ import cv2
 import numpy as np
 import pytest
 from live_cameras import Oak, RealSense
-from pelorus.cli import main
+from pelorus.commands.cli import main
 from pelorus.errors import PelorusError
-from pelorus.frames import Imu
 from pelorus.live import oak, realsense, v4l2
 from pelorus.live.camera import Asked, Force, Picture, Rate, open_camera
 from pelorus.live.clock import OtherClock
+from pelorus.math.se3 import Poses
 from pelorus.rig.lens import Lens, LensModel
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Imu
 from rigs import Cameras, camchain, write_yaml
 from scipy.spatial.transform import Rotation
 from test_rig_several import depthai

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_cameras import Scripted, single
-from pelorus.cli import main
+from pelorus.commands.cli import main
 from pelorus.errors import PelorusError
-from pelorus.frames import Imu, Reading
+from pelorus.io.recording import Recording
 from pelorus.live.session import HERE, How, Session
 from pelorus.live.wheels import Beside, Datagrams, WheelsAsked
-from pelorus.recording import Recording
 from pelorus.rig.read import Calibrated
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Imu, Reading
+from pelorus.wire.framing import messages_of
 from test_convert_csv import write_csv
 
 pytestmark = pytest.mark.usefixtures("built")

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from converted import Run as Command
 from pelorus.errors import PelorusError
-from pelorus.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
 from pelorus.grid import files
 from pelorus.grid.occupancy import Band, Grid, Wish, occupancy
 from pelorus.grid.sightings import Sightings, sightings
-from pelorus.layout import pack_symmetric
-from pelorus.wire import messages_of
+from pelorus.wire.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
+from pelorus.wire.framing import messages_of
+from pelorus.wire.layout import pack_symmetric
 from PIL import Image
 from replay_drive import BIN, drive, encode, header, known
 from replay_drive import run as run_replay

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from converted import Run
-from pelorus import wire
-from pelorus.frames import Header, Landmark, Message, Stereo, Truth
-from pelorus.tracks import project
+from pelorus.io.tracks import project
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Landmark, Message, Stereo, Truth
 from replay_drive import ROOT
 from replay_drive import run as run_replay
 
@@ -75,7 +75,7 @@ def fitted(header: Header, seen: Seen, start: Any) -> Any:
 def test_mapping_is_as_good_as_a_fit_of_each_landmark_by_itself(
     pelorus: Run, starry: Path, tmp_path: Path
 ) -> None:
-    messages = [frame.message for frame in wire.read_file(starry)[0]]
+    messages = [frame.message for frame in framing.read_file(starry)[0]]
     header = next(m for m in messages if isinstance(m, Header))
     known = {m.id: m.p_W_m for m in messages if isinstance(m, Landmark)}
     seen = sightings(messages)
@@ -107,7 +107,7 @@ def test_mapping_is_as_good_as_a_fit_of_each_landmark_by_itself(
 
 def test_residuals_at_the_true_landmarks_do_not_average_out(starry: Path) -> None:
     """... for it takes for white noise what the recording's poses and calibration are off by."""
-    messages = [frame.message for frame in wire.read_file(starry)[0]]
+    messages = [frame.message for frame in framing.read_file(starry)[0]]
     header = next(m for m in messages if isinstance(m, Header))
     known = {m.id: m.p_W_m for m in messages if isinstance(m, Landmark)}
     beyond = []

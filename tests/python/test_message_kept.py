@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus import schema
-from pelorus.frames import Kind, Message
-from pelorus.layout import MalformedPayload
-from pelorus.message import MANY
-from pelorus.wire import KINDS
+from pelorus.wire import schema
+from pelorus.wire.frames import Kind, Message
+from pelorus.wire.framing import KINDS
+from pelorus.wire.layout import MalformedPayload
+from pelorus.wire.message import MANY
 from wire_messages import messages_of
 
 SAMPLES = [m for m in messages_of(5, 6) if m.kind in MANY]

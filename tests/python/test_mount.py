@@ -13,10 +13,10 @@ from converted import Run
 from draws import draws, long_run
 from everyday import drawn
 from everyday import drive as everyday_drive
-from pelorus import se3
 from pelorus.check import verdict
 from pelorus.check.mount import Turned
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math import se3
 from replay_drive import BIN
 
 WALK = replace(

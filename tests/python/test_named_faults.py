@@ -14,15 +14,15 @@ from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import ALIKE, OF_RECORDINGS, found_in, of_times, piece
-from pelorus import wire
 from pelorus.check.contents import recording_of, write
-from pelorus.converters import matlab
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.handeye import SEEN_MOST, first_part
 from pelorus.faults.identity import Jumps
 from pelorus.faults.named import judged_of
-from pelorus.frames import Header, Kind, Stereo, Twist
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Kind, Stereo, Twist
+from pelorus_course import matlab
 from replay_drive import BIN, drive
 
 STEADY = ("--bias-velocity-sigma", "0", "--loss", "0.03", "--twist-rate", "50")
@@ -30,11 +30,11 @@ STEADY = ("--bias-velocity-sigma", "0", "--loss", "0.03", "--twist-rate", "50")
 
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+    from pelorus.commands.cli import main  # noqa: PLC0415 - typer is slow to load
 
     path = tmp_path_factory.mktemp("named") / "drive.plr"
     assert main(["simulate", str(path), "--seed", "4", "--duration", "25", *STEADY]) == 0
-    return recording_of(wire.messages_of(path))
+    return recording_of(framing.messages_of(path))
 
 
 def test_a_clean_recording_has_no_faults(simulated: Recording) -> None:

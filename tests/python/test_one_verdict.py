@@ -13,20 +13,20 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
-from pelorus import schema
 from pelorus.check import verdict
 from pelorus.check.known import Known
 from pelorus.check.verdict import Grade
+from pelorus.evaluate.health import SHORT, time_line
 from pelorus.explain import explain
 from pelorus.explain.incident import Cause
-from pelorus.frames import Kind, Message, Report, Text, Truth
-from pelorus.health import SHORT, time_line
-from pelorus.replay import replayed
+from pelorus.native.replay import replayed
 from pelorus.report.curves import Curves
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire import schema
+from pelorus.wire.frames import Kind, Message, Report, Text, Truth
 from replay_drive import BIN
 from report_runs import built_programs
 

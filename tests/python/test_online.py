@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus import se3
-from pelorus.cli import main
-from pelorus.frames import Config, Imu, Pose, Start, Stereo, Twist
-from pelorus.layout import Floats
+from pelorus.commands.cli import main
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.online.drive import Setup
 from pelorus.online.odometry import Given, Odom, Odometry
 from pelorus.online.order import ClockStep, Datum, Sequencer
 from pelorus.online.pairs import Joining, Pairing
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Config, Imu, Pose, Start, Stereo, Twist
+from pelorus.wire.framing import messages_of
+from pelorus.wire.layout import Floats
 
 MS = 1_000_000
 pytestmark = pytest.mark.usefixtures("built")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from converted import Run
-from pelorus.wire import read_file
+from pelorus.wire.framing import read_file
 from replay_drive import Record, drive, run
 
 

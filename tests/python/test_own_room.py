@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from converted import Run, messages_of
 from draws import draws
-from pelorus.frames import Header, Process
+from pelorus.wire.frames import Header, Process
 from rendered import SMALL
 from replay_drive import BIN, judged
 from rigs import FISHEYE, Cameras

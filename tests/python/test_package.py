@@ -17,8 +17,8 @@ import pelorus
 import pytest
 from packaging.requirements import Requirement
 from pelorus import __version__
-from pelorus.cli import main
-from pelorus.distribution import mixed_up
+from pelorus.commands.cli import main
+from pelorus.program.distribution import mixed_up
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,7 +29,7 @@ MOST_BYTES = 250e6  # of a plain install
 def without(packages: Sequence[str], *words: str) -> subprocess.CompletedProcess[str]:
     """A command where these are not installed."""
     hidden = f"import sys; sys.modules.update(dict.fromkeys({list(packages)}))"
-    main = "from pelorus.cli import main; sys.exit(main(sys.argv[1:]))"
+    main = "from pelorus.commands.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", f"{hidden}; {main}", *words]
     there = os.environ | {"PELORUS_BIN": str(BIN)}
     return subprocess.run(command, capture_output=True, text=True, check=False, env=there)
@@ -73,7 +73,8 @@ def test_somebody_elses_pelorus_beside_this_one_is_told(
 
 def test_pip_puts_the_replay_on_the_path() -> None:
     for name, function in (("pelorus-replay", "float32"), ("pelorus-replay-f64", "float64")):
-        code = f"import sys; from pelorus.replay_program import {function}; sys.exit({function}())"
+        program = f"from pelorus.native.replay_program import {function}"
+        code = f"import sys; {program}; sys.exit({function}())"
         command = [sys.executable, "-c", code, "--version"]
         there = os.environ | {"PELORUS_BIN": str(BIN)}
         done = subprocess.run(command, capture_output=True, text=True, check=False, env=there)
@@ -88,10 +89,13 @@ def test_pip_puts_the_replay_on_the_path() -> None:
 @pytest.mark.parametrize(
     ("extra", "code"),
     [
-        ("vision", "from pelorus.extras import cv2; cv2.blur"),
+        ("vision", "from pelorus.program.extras import cv2; cv2.blur"),
         ("vision", "from pelorus.tracking.images import unpacked; unpacked(Path(), b'')"),
         ("ros", "from pelorus.converters.bag import Bag; Bag(Path('/dev/null'))"),
-        ("px4", "from pelorus.extras import extra\nwith extra('pyulog'):\n    import pyulog"),
+        (
+            "px4",
+            "from pelorus.program.extras import extra\nwith extra('pyulog'):\n    import pyulog",
+        ),
         ("fleet", "from pelorus.fleet.table import require_database; require_database()"),
         ("fleet", "from pelorus.fleet.cluster import client_of; client_of(None, 1).__enter__()"),
         ("geodetic", "from pelorus.converters.geodetic import Ground; Ground().system()"),
@@ -134,6 +138,7 @@ def test_every_command_works_from_the_wheel_alone(own_wheel: Path, tmp_path: Pat
     """In an environment of its own, which sees the dependencies of this one and no checkout."""
     assert "-py3-none-" in own_wheel.name  # of no version of Python
     packed = zipfile.ZipFile(own_wheel)
+    assert not [name for name in packed.namelist() if "course" in name]  # tools/course is apart
     assert sum(info.file_size for info in packed.infolist()) < 10e6
     environment = tmp_path / "environment"
     venv.create(environment, with_pip=False)
@@ -168,8 +173,9 @@ def test_every_command_works_from_the_wheel_alone(own_wheel: Path, tmp_path: Pat
         said("-m", "pelorus", *words.split())
     assert (away / "report/report.html").is_file()
     (entries,) = site.glob("pelorus_slam-*.dist-info/entry_points.txt")
-    assert "pelorus-replay=pelorus.replay_program:float32" in entries.read_text().replace(" ", "")
-    said("-c", "from pelorus.replay_program import float32; float32()", "--version")
+    command = "pelorus-replay=pelorus.native.replay_program:float32"
+    assert command in entries.read_text().replace(" ", "")
+    said("-c", "from pelorus.native.replay_program import float32; float32()", "--version")
     camera = "pelorus.Calibration(400, 400, 320, 240, 0.1)"
     for precision in ("float32", "float64"):
         code = f"import pelorus; print(pelorus.Filter({camera}, precision={precision!r}).pose().p)"

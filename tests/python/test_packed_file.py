@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from converted import Run
 from fake_board import FakeBoard, TcpBoard
-from pelorus import packed_file, wire
-from pelorus.frames import Stereo
+from pelorus.wire import framing, packed_file
+from pelorus.wire.frames import Stereo
 from replay_drive import BIN, FRAMES, drive, encode
 from report_runs import built_programs
 
@@ -28,9 +28,9 @@ def test_a_packed_recording_is_read_as_the_plain_one(tmp_path: Path) -> None:
     content = encode(drive())
     plain = tmp_path / "drive.plr"
     plain.write_bytes(content)
-    expected, counts = wire.read_file(plain)
+    expected, counts = framing.read_file(plain)
     for name in ("drive.plr.zst", "misnamed.plr"):  # what it is, its bytes say
-        received, found = wire.read_file(packed(tmp_path, content, name))
+        received, found = framing.read_file(packed(tmp_path, content, name))
         assert received == expected
         assert found == counts
 
@@ -40,7 +40,7 @@ def test_two_packed_pieces_in_a_row_are_one_recording(tmp_path: Path) -> None:
     one, other = (packed(tmp_path, part).read_bytes() for part in (content[:3000], content[3000:]))
     path = tmp_path / "drive.plr.zst"
     path.write_bytes(one + other)
-    assert wire.read_file(path)[1].ended
+    assert framing.read_file(path)[1].ended
 
 
 @pytest.mark.parametrize("cut", [0.3, 0.9])
@@ -52,7 +52,7 @@ def test_of_a_file_that_was_cut_short_what_is_there_is_read(tmp_path: Path, cut:
             stream.flush()
     whole = path.read_bytes()
     path.write_bytes(whole[: int(cut * len(whole))])
-    received, counts = wire.read_file(path)
+    received, counts = framing.read_file(path)
     assert len(received) > 0.5 * cut * 600
     assert not counts.ended
 
@@ -69,7 +69,7 @@ def test_behind_damage_nothing_can_be_unpacked_and_that_is_told(
     bytes_ = bytearray(path.read_bytes())
     bytes_[len(bytes_) // 2 : len(bytes_) // 2 + 40] = b"\xff" * 40
     path.write_bytes(bytes_)
-    received, counts = wire.read_file(path)
+    received, counts = framing.read_file(path)
     assert 0 < len(received) < 600
     assert counts.damaged >= 1
     assert "zstd packing is damaged" in pelorus("info", path).out
@@ -116,7 +116,7 @@ def test_a_robots_log_is_packed_and_compared(pelorus: Run, tmp_path: Path) -> No
     with TcpBoard(FakeBoard()) as board:
         pelorus("stream", path, "--to", board.target, "--record", log)
     assert log.read_bytes().startswith(packed_file.MAGIC)
-    assert wire.read_file(log)[1].ended
+    assert framing.read_file(log)[1].ended
     assert pelorus("compare", log, "--bin", BIN, status=None).status in (
         0,
         1,
@@ -127,7 +127,7 @@ def test_0027_takes_no_more_than_15_bytes_an_observation(
     real: Callable[[str], Path], zst_0027: Path
 ) -> None:
     source, path = real("ece276a/0027.npz"), zst_0027
-    frames = [r.message for r in wire.read_file(path)[0] if isinstance(r.message, Stereo)]
+    frames = [r.message for r in framing.read_file(path)[0] if isinstance(r.message, Stereo)]
     observations = int(np.sum([len(frame.ids) for frame in frames]))
     assert observations == 75647
     assert path.stat().st_size <= 15 * observations < source.stat().st_size

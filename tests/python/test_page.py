@@ -18,18 +18,18 @@ import numpy as np
 import pytest
 from chromium import Tab, tab
 from converted import Run as Command
-from pelorus.evidence import Evidence
 from pelorus.explain import explain
-from pelorus.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Truth
-from pelorus.layout import unpack_symmetric
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.report.packed import Packer
 from pelorus.report.page import Answer, PageTable
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.evidence import Evidence
+from pelorus.wire.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Truth
+from pelorus.wire.framing import messages_of
+from pelorus.wire.layout import unpack_symmetric
 from replay_drive import SECOND as S
 from replay_drive import drive, encode, header, run
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pelorus.evaluation import Accuracy, assess
-from pelorus.relative_error import drifts
-from pelorus.se3 import Poses
-from pelorus.trajectory import Trajectory
+from pelorus.evaluate.evaluation import Accuracy, assess
+from pelorus.evaluate.relative_error import drifts
+from pelorus.io.trajectory import Trajectory
+from pelorus.math.se3 import Poses
 from scipy.spatial.transform import Rotation
 
 COUNT = 401

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus import settings
-from pelorus.evaluation import judge
-from pelorus.frames import (
+from pelorus.evaluate.evaluation import judge
+from pelorus.wire import settings
+from pelorus.wire.frames import (
     Config,
     Kind,
     Noise,

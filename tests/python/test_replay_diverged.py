@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus.evaluation import judge
-from pelorus.frame_table import frame_table
-from pelorus.frames import Report
+from pelorus.evaluate.evaluation import judge
+from pelorus.evaluate.frame_table import frame_table
+from pelorus.wire.frames import Report
 from replay_drive import (
     Result,
     drive,

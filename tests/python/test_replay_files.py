@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus import wire
-from pelorus.frames import (
+from pelorus.wire import framing
+from pelorus.wire.frames import (
     Camera,
     Kind,
     Message,
@@ -171,7 +171,7 @@ def test_unknown_kinds_and_short_payloads_are_skipped_and_counted(record: Record
 
     messages = drive()
     messages[10:10] = [Unknown(), Short(), Unknown()]
-    stream = b"".join(wire.encode(message, i) for i, message in enumerate(messages))
+    stream = b"".join(framing.encode(message, i) for i, message in enumerate(messages))
     summary = run(record(stream), "--json").summary
     assert (summary["unknown"], summary["malformed"], summary["damaged"]) == (2, 1, 0)
     assert summary["frames"] == FRAMES

@@ -10,8 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flight_logs import SAME, Compare, robots_log
-from pelorus.frames import Imu, Kind, Message, Pose, Process, Report, Start, StartFlag, Stereo, Text
 from pelorus.robot.stream import start_from
+from pelorus.wire.frames import (
+    Imu,
+    Kind,
+    Message,
+    Pose,
+    Process,
+    Report,
+    Start,
+    StartFlag,
+    Stereo,
+    Text,
+)
 from replay_drive import (
     FRAMES,
     RATE,

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus.evaluation import judge, made_in
-from pelorus.frames import Landmark, Message
+from pelorus.evaluate.evaluation import judge, made_in
+from pelorus.wire.frames import Landmark, Message
 from replay_drive import (
     BIN,
     EXACT_CAMERA,

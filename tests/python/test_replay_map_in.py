@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus.frames import BodyAxes, Camera, Kind, Landmark, Message, Role, Twist
+from pelorus.wire.frames import BodyAxes, Camera, Kind, Landmark, Message, Role, Twist
 from replay_drive import (
     OK,
     USAGE,

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus import settings
-from pelorus.frames import (
+from pelorus.wire import settings
+from pelorus.wire.frames import (
     Config,
     Message,
     Start,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus.frames import Kind, Message, Report, Start, State, StateAction, Text, Truth
+from pelorus.wire.frames import Kind, Message, Report, Start, State, StateAction, Text, Truth
 from replay_drive import (
     FRAMES,
     OK,

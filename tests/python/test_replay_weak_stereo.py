@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.simulate.simulate import Options, simulate
 from replay_drive import run
 
 WEAK = Options(seed=1, duration_s=200.0, lap_s=400.0, landmarks=8000, speed_mps=10.0, outliers=0.0)

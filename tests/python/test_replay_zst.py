@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from pelorus import packed_file
+from pelorus.wire import packed_file
 from replay_drive import BIN, OUTPUT, RECORDING, Record, bits_of, drive, run
 
 ZSTD = shutil.which("zstd")

@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
-from pelorus import se3
 from pelorus.commands.report import DRAWINGS
-from pelorus.consistency import nees_per_dof
 from pelorus.errors import PelorusError
-from pelorus.evaluation import assess, made_in, map_figures
-from pelorus.frame_table import frame_table, write_csv
-from pelorus.frames import Kind, Landmark, Pose, Report, Role, Stereo, Truth
-from pelorus.layout import pack_symmetric, unpack_symmetric
-from pelorus.replay import Outputs, Programs
+from pelorus.evaluate.evaluation import assess, made_in, map_figures
+from pelorus.evaluate.frame_table import frame_table, write_csv
+from pelorus.io.trajectory import Trajectory, estimate_in, read_stamped
+from pelorus.math import se3
+from pelorus.math.consistency import nees_per_dof
+from pelorus.native.replay import Outputs, Programs
 from pelorus.report import words
 from pelorus.report.comparison import Comparison
 from pelorus.report.results import read_map
-from pelorus.trajectory import Trajectory, estimate_in, read_stamped
+from pelorus.wire.frames import Kind, Landmark, Pose, Report, Role, Stereo, Truth
+from pelorus.wire.layout import pack_symmetric, unpack_symmetric
 from PIL import Image
 from replay_drive import FRAMES, ROOT, drive, encode, header, known, t_ns
 from replay_drive import run as run_replay

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imu_drives import noisy
-from pelorus import style
 from pelorus.commands.report import DRAWINGS
-from pelorus.frame_table import write_csv
-from pelorus.frames import BodyAxes
+from pelorus.evaluate.frame_table import write_csv
 from pelorus.grid import plane
-from pelorus.replay import Programs
+from pelorus.math.se3 import Poses
+from pelorus.native.replay import Programs
+from pelorus.program import style
 from pelorus.report import pictures, top_view
 from pelorus.report.curves import Curves
-from pelorus.se3 import Poses
+from pelorus.wire.frames import BodyAxes
 from replay_drive import drive, known
 from report_runs import built_programs, compared, recorded
 

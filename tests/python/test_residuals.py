@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from pelorus.explain.log import FilterLog, log_of
-from pelorus.layout import Floats
-from pelorus.replay import replayed
+from pelorus.native.replay import replayed
 from pelorus.report.drawings import plot
 from pelorus.report.residuals import Residuals, residuals, residuals_of
 from pelorus.report.spectra import drawings
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.layout import Floats
 from report_runs import built_programs
 
 

@@ -14,15 +14,15 @@ from typing import Any, cast
 import cv2
 import numpy as np
 import pytest
-from pelorus import se3
 from pelorus.errors import PelorusError
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import BodyAxes, Noise
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.tracks import project
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
-from pelorus.tracks import project
+from pelorus.wire.frames import BodyAxes, Noise
 from rigs import (
     IMU_NOISE,
     RADTAN,

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pelorus import se3
-from pelorus.inertial import Inertial
+from pelorus.math import se3
+from pelorus.math.inertial import Inertial
+from pelorus.math.se3 import Poses
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import Lens, LensModel
-from pelorus.se3 import Poses
 from rigs import (
     IMU_NOISE,
     Cameras,

@@ -15,15 +15,15 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pelorus import se3
 from pelorus.converters.streams import RawTracks, Streams, Twists, recording
 from pelorus.errors import PelorusError
-from pelorus.foreign import ForeignFileError
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.tracks import Tracks, project
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
-from pelorus.tracks import Tracks, project
 from rigs import (
     IMU_NOISE,
     SIZE,

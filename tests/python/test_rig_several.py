@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus import se3
-from pelorus.foreign import ForeignFileError
+from pelorus.io.foreign import ForeignFileError
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import LensModel
-from pelorus.se3 import Poses
 from rigs import (
     IMU_NOISE,
     SIZE,

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from odom_samples import T_IB, Sample, nees, sample
-from pelorus import se3
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.online.odometry import adjoint, level, turned
-from pelorus.se3 import Poses
 from pelorus_ros import conventions
 from pelorus_ros.mounting import Mounting, NoChain
 from replay_drive import BIN

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pelorus.cli import main
+from pelorus.commands.cli import main
 from pelorus.errors import PelorusError
-from pelorus.frames import Imu, Message, Stereo
 from pelorus.online.diagnosis import Level, of_health
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options as Drive
-from pelorus.simulation.simulate import simulate
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options as Drive
+from pelorus.simulate.simulate import simulate
+from pelorus.wire.frames import Imu, Message, Stereo
 from pelorus_ros import conventions
 from pelorus_ros.estimator import Estimator
 from pelorus_ros.parameters import Options, misspelt, table
@@ -105,6 +105,36 @@ def test_wheels_beside_an_imu_are_used_in_the_imus_axes(
     assert robot.odometry.drive is not None
     assert not robot.odometry.drive.refused
     assert told[-1].velocity[:3] == pytest.approx(turn.T @ told[-1].estimate.velocity[:3], abs=1e-9)
+
+
+def test_a_yaw_rate_of_wheels_tells_the_velocity_of_each(
+    by_imu: tuple[Any, list[Message]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    head, messages = by_imu
+    asked = options(wheels_beside_imu=True, base_frame="base_link", wheel_track_m=0.5)
+    robot = equipped(Estimator(asked), head)
+    robot.transforms(transform("base_link", "imu", np.eye(3), (0.0, 0, 0)))
+    given = np.array([1.0, 0, 0]), np.array([0, 0, 0.4])
+    kept: list[Any] = []
+
+    def keep(one: Any) -> list[Any]:
+        kept.append(one)
+        return []
+
+    for m in messages:
+        driven(robot, [m])
+        if isinstance(m, Stereo) and robot.odometry is not None:
+            monkeypatch.setattr(robot.pipeline, "add", keep)
+            robot.wheels(wheels(m.t_ns + 1_000_000, *given))
+            break
+    assert not robot.faults
+    left, right = kept
+    assert left.value[:3] == pytest.approx((1.0 - 0.4 * 0.25, 0, 0))
+    assert right.value[:3] == pytest.approx((1.0 + 0.4 * 0.25, 0, 0))
+    assert left.at_B_m - right.at_B_m == pytest.approx((0, 0.5, 0))
+    assert left.sigma == pytest.approx(np.full(3, np.sqrt(2) * 0.05))
+    with pytest.raises(PelorusError, match="parameter wheel_track_m: -1"):
+        Options.of({name: value for name, (value, _) in table().items()} | {"wheel_track_m": -1.0})
 
 
 def test_an_imu_in_g_is_told_and_gives_no_pose(by_imu: tuple[Any, list[Message]]) -> None:

@@ -14,14 +14,14 @@ from bags import NS, Recorder
 from converted import Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
-from pelorus import se3
 from pelorus.converters import ros_frames
 from pelorus.converters.bag import Bag
 from pelorus.errors import PelorusError
-from pelorus.frames import Header
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig.read import read_rig
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Header
 from rendered import HEIGHT, WIDTH, Scene
 from rigs import camchain, write_yaml
 from scipy.spatial.transform import Rotation

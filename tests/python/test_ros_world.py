@@ -14,12 +14,12 @@ from bags import NS, Recorder
 from converted import SHORT, Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
-from pelorus import motion
 from pelorus.converters import order, ros_frames
 from pelorus.converters.bag import Bag
-from pelorus.frames import Imu, Twist
-from pelorus.inertial_survey import readings_of
-from pelorus.recording import Recording
+from pelorus.evaluate.inertial_survey import readings_of
+from pelorus.io.recording import Recording
+from pelorus.math import motion
+from pelorus.wire.frames import Imu, Twist
 from rigs import opencv_text
 from scipy.spatial.transform import Rotation
 from test_convert_ros import written

@@ -12,8 +12,8 @@ from pelorus.check.outcome import NOTHING
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tracks_noise import TrackNoise
-from pelorus.row_gaps import row_gaps
-from pelorus.tracks import Tracks
+from pelorus.io.tracks import Tracks
+from pelorus.tracking.row_gaps import row_gaps
 
 FRAMES, POINTS = 12, 60
 

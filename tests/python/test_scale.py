@@ -20,7 +20,7 @@ from pelorus.check.biases import WIDE
 from pelorus.check.contents import scaled
 from pelorus.check.options import Settings
 from pelorus.check.outcome import NOTHING, SCALE, Bench
-from pelorus.frames import Twist
+from pelorus.wire.frames import Twist
 from replay_drive import BIN, drive, header
 from report_runs import built_programs
 
@@ -28,7 +28,7 @@ TRUE = {"pixel-sigma": "0.5", "velocity-sigma": "0.05", "gyro-sigma": "0.005"}
 
 
 def simulated(folder: Path, *options: str) -> Path:
-    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+    from pelorus.commands.cli import main  # noqa: PLC0415 - typer is slow to load
 
     noise = [word for name, value in TRUE.items() for word in (f"--{name}", value)]
     path = folder / "drive.plr"

@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 from converted import Run, messages_of
 from drives import PERFECT
-from pelorus import motion, se3, wire
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Kind, Landmark, Role, Stereo, TwistTiming
-from pelorus.layout import Floats
-from pelorus.simulation import drive, scene
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options, Simulation, simulate
-from pelorus.tracks import project
+from pelorus.io.tracks import project
+from pelorus.math import motion, se3
+from pelorus.simulate import drive, scene
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options, Simulation, simulate
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Kind, Landmark, Role, Stereo, TwistTiming
+from pelorus.wire.layout import Floats
 from scipy.linalg import expm
 
 
@@ -197,7 +198,7 @@ def test_the_header_tells_the_noise_that_there_is(tmp_path: Path, pelorus: Run) 
 def test_frames_of_a_slow_camera_stand_later_in_the_file(tmp_path: Path, pelorus: Run) -> None:
     target = tmp_path / "slow.plr"
     pelorus("simulate", target, "--duration", 3, "--camera-delay", 0.055)
-    received, _ = wire.read_file(target)
+    received, _ = framing.read_file(target)
     latest = 0
     delays = []
     for frame in received:

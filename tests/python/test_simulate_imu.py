@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from converted import Run, messages_of
 from imu_drives import EXACT, NOISY, options
-from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Imu, Process, Start, Stereo, Twist
-from pelorus.layout import Floats, unpack_symmetric
-from pelorus.simulation.imu import ImuFaults, StartGiven
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Simulation, simulate
+from pelorus.simulate.imu import ImuFaults, StartGiven
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Simulation, simulate
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Imu, Process, Start, Stereo, Twist
+from pelorus.wire.layout import Floats, unpack_symmetric
 from replay_drive import BIN
 
 
@@ -224,7 +224,7 @@ def test_late_readings_stand_behind_newer_frames(tmp_path: Path, pelorus: Run) -
     target = tmp_path / "late.plr"
     options = ("--imu-rate", 100, "--duration", 3, "--imu-delay", 0.055, "--imu-batch", 1)
     pelorus("simulate", target, *options)
-    received, _ = wire.read_file(target)
+    received, _ = framing.read_file(target)
     latest, late = 0, set()
     for frame in received:
         if isinstance(frame.message, Stereo):

@@ -11,16 +11,17 @@ import drives
 import numpy as np
 import pytest
 from converted import Run, messages_of
-from pelorus import se3, wire
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Kind, Message, Stereo, Twist
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.simulation import scene
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.tracks import triangulate
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import triangulate
+from pelorus.math import se3
+from pelorus.simulate import scene
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Kind, Message, Stereo, Twist
+from pelorus.wire.layout import Floats
 
 PERFECT = replace(drives.PERFECT, duration_s=12.0, loss=Options.loss, keep_ids=True)
 NOISY = Options(duration_s=6.0)
@@ -91,7 +92,7 @@ def test_late_twists_stand_behind_newer_frames_with_their_own_times(
     target = tmp_path / "late.plr"
     options = ("--duration", 2, "--drop", 0, "--twist-delay", 0.015)
     pelorus("simulate", target, *options)
-    messages: list[Message] = [frame.message for frame in wire.read_file(target)[0]]
+    messages: list[Message] = [frame.message for frame in framing.read_file(target)[0]]
     first = next(k for k, m in enumerate(messages) if isinstance(m, Stereo) and m.t_ns == 10**9)
     times = [m.t_ns for m in messages[first + 1 :] if isinstance(m, Twist)]
     assert times[:2] == [990_000_000, 1_000_000_000]

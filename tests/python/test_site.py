@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from chromium import Tab, chromium, tab
 from draws import long_run
-from pelorus.cli import main
+from pelorus.commands.cli import main
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 from converted import SHORT, Run, messages_of
 from drives import PERFECT, clean
-from pelorus import wire
-from pelorus.frames import Reading
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.readings import Sensing
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.small_sensors import SMALL_SENSORS, SmallSensor
+from pelorus.io.recording import Recording
+from pelorus.io.small_sensors import SMALL_SENSORS, SmallSensor
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.readings import Sensing
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire import framing as wire
+from pelorus.wire.frames import Reading
+from pelorus.wire.layout import Floats
 from replay_drive import ROOT, judged, run
 from test_convert_blind import imu as imu_csv
 from test_convert_csv import csv_files, write_csv

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pelorus import stamps
 from pelorus.converters.columns import Columns
-from pelorus.foreign import ForeignFileError
-from pelorus.table import Table
+from pelorus.io import stamps
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.table import Table
 
 NAMES = "ax=fx:m/s2,ay=fy:m/s2,az=fz:m/s2,wx=gx:rad/s,wy=gy:rad/s,wz=gz:rad/s"
 RATE_HZ, COUNT = 250, 1000

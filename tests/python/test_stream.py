@@ -19,9 +19,15 @@ import numpy as np
 import pytest
 from converted import Run
 from fake_board import FULL, FakeBoard, Manner, Served, TcpBoard, TerminalBoard
-from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.frames import (
+from pelorus.robot import link
+from pelorus.robot.flight_log import FlightLog
+from pelorus.robot.link import Link, LinkClosed
+from pelorus.robot.serial import open_serial
+from pelorus.robot.status import refusal
+from pelorus.robot.stream import Streamer
+from pelorus.wire import framing
+from pelorus.wire.frames import (
     Config,
     Kind,
     Message,
@@ -30,13 +36,7 @@ from pelorus.frames import (
     Stereo,
     Text,
 )
-from pelorus.robot import link
-from pelorus.robot.flight_log import FlightLog
-from pelorus.robot.link import Link, LinkClosed
-from pelorus.robot.serial import open_serial
-from pelorus.robot.status import refusal
-from pelorus.robot.stream import Streamer
-from pelorus.schema import STATUSES
+from pelorus.wire.schema import STATUSES
 from replay_drive import BIN, FRAMES, drive, encode, log_of, run
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -309,7 +309,7 @@ def test_a_connection_that_is_lost_says_how_far_it_came_and_leaves_a_whole_log(
     assert re.search(rf"\(after 1[01] of {FRAMES} frames\)", said.err)
     assert "10 answered with a pose" in said.out
     assert f"recorded {log}" in one_line(said.out)
-    received, counts = wire.read_file(log)
+    received, counts = framing.read_file(log)
     assert counts.clean
     assert not counts.ended
     kept = [frame.message for frame in received]
@@ -329,7 +329,7 @@ def test_a_board_that_never_answers_is_given_up_and_the_log_says_when(
         to = ("--to", served.target, "--answer", "0.02")
         said = pelorus("stream", recording, *to, "--record", log, status=1)
     assert "5 frames in a row without an answer; is the board running the firmware" in said.err
-    received, counts = wire.read_file(log)
+    received, counts = framing.read_file(log)
     assert counts.clean
     remarks = [frame.message.text for frame in received if isinstance(frame.message, Text)]
     times = [m.t_ns for m in drive() if isinstance(m, Stereo)][:5]
@@ -394,7 +394,7 @@ def kept(*messages: Message) -> list[Message]:
     log = FlightLog(stream)
     for message in messages:
         log.keep(message, heard=message is SETTINGS or isinstance(message, Report))
-    return [frame.message for frame in wire.Reader().feed(stream.getvalue())]
+    return [frame.message for frame in framing.Reader().feed(stream.getvalue())]
 
 
 def test_the_log_holds_data_back_until_the_settings_are_told() -> None:
@@ -433,7 +433,7 @@ def test_a_log_that_is_ended_holds_all_and_is_whole() -> None:
     for message in drive(3):
         log.keep(message)
     log.end()
-    reader = wire.Reader()
+    reader = framing.Reader()
     assert [frame.message for frame in reader.feed(stream.getvalue())][:-1] == drive(3)
     assert reader.counts.clean
     assert reader.counts.ended

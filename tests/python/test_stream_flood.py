@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from converted import Run
 from fake_board import FakeBoard, Manner, TcpBoard
-from pelorus import wire
-from pelorus.frames import Text
 from pelorus.robot import stream
 from pelorus.robot.link import Link, LinkStalled
+from pelorus.wire import framing
+from pelorus.wire.frames import Text
 from replay_drive import drive, encode
 
 
@@ -36,7 +36,7 @@ FLOODS = {
     "zeros": bytes(4096),
     "no end of a frame": b"\x55" * 4096,
     "many empty frames": b"\x01\x00" * 2048,
-    "sound frames": wire.encode(Text("and another thing"), 0) * 100,
+    "sound frames": framing.encode(Text("and another thing"), 0) * 100,
 }
 FLOODED = pytest.mark.parametrize("flood", list(FLOODS.values()), ids=list(FLOODS))
 

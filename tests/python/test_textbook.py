@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus.frames import Kind, Landmark, Stereo
-from pelorus.trajectory import read_stamped
+from pelorus.io.trajectory import read_stamped
+from pelorus.wire.frames import Kind, Landmark, Stereo
 from replay_drive import (
     BIN,
     EXACT_CAMERA,

@@ -15,22 +15,24 @@ import pytest
 from converted import Run
 from draws import long_run
 from numpy.typing import NDArray
-from pelorus import se3, trajectory, wire
 from pelorus.check.checked import Checked, check, config_text
 from pelorus.check.contents import recording_of
-from pelorus.converters import matlab
-from pelorus.evaluation import assess
+from pelorus.evaluate.evaluation import assess
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.named import judged_of
 from pelorus.faults.two_views import two_views
-from pelorus.frames import Camera, TwistTiming
-from pelorus.recording import Recording
-from pelorus.table import Table
+from pelorus.io import trajectory
+from pelorus.io.recording import Recording
+from pelorus.io.table import Table
+from pelorus.io.tracks import Tracks, triangulate
+from pelorus.io.trajectory import Trajectory
+from pelorus.math import se3
 from pelorus.tracking import images, matching
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
-from pelorus.tracks import Tracks, triangulate
-from pelorus.trajectory import Trajectory
+from pelorus.wire import framing
+from pelorus.wire.frames import Camera, TwistTiming
+from pelorus_course import matlab
 from replay_drive import BIN, judged
 
 Monkeypatch = pytest.MonkeyPatch
@@ -418,7 +420,7 @@ def test_on_kitti_06_the_tracks_hold_noisy_twists_to_the_road(
     figures = []
     for drive, alone_m in draws(poses, klt, first):
         drive.write(tmp_path / "drive.plr")
-        messages = wire.messages_of(tmp_path / "drive.plr")
+        messages = framing.messages_of(tmp_path / "drive.plr")
         named = judged_of(messages, recording_of(messages)).faults
         assert not [fault for fault in named if fault.name != UNTOLD]  # its turns are noise
         mine = judged(tmp_path / "drive.plr", "--config", TRACK_CONF)

@@ -10,9 +10,9 @@ import pytest
 from imu_drives import noisy
 from pelorus.converters.streams import Pictures, RawTracks, Readings, Streams, recording
 from pelorus.errors import PelorusError
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.io.trajectory import Trajectory
 from pelorus.rig.read import Calibrated
-from pelorus.trajectory import Trajectory
 
 DAY_NS = 1_600_000_000 * 10**9
 

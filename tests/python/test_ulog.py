@@ -12,9 +12,9 @@ from converted import Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
 from pelorus.converters.columns import Columns
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Imu
-from pelorus.inertial_survey import readings_of
+from pelorus.evaluate.inertial_survey import readings_of
+from pelorus.io.foreign import ForeignFileError
+from pelorus.wire.frames import Imu
 from test_convert_columns import options_of
 
 pytest.importorskip("pyulog")

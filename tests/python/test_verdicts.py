@@ -16,11 +16,11 @@ from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import found_in, injections
-from pelorus import se3
 from pelorus.converters.streams import Twists, converted, recording
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.named import faults_in
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math import se3
 from robots import BY_IMU, KINDS, WHOLE, drive
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "recordings"))

@@ -17,14 +17,14 @@ import numpy as np
 import pytest
 from converted import Run as Command
 from fake_board import FakeBoard, TcpBoard
-from pelorus.ellipsoids import POINT_M, SIGMAS, ellipsoids, of_landmarks
-from pelorus.evidence import Evidence
-from pelorus.frames import Landmark, Message, Pose, Report, Role, Stereo
-from pelorus.layout import pack_symmetric, unpack_symmetric
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import messages_of, write_file
+from pelorus.math.ellipsoids import POINT_M, SIGMAS, ellipsoids, of_landmarks
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.evidence import Evidence
+from pelorus.wire.frames import Landmark, Message, Pose, Report, Role, Stereo
+from pelorus.wire.framing import messages_of, write_file
+from pelorus.wire.layout import pack_symmetric, unpack_symmetric
 from replay_drive import drive, encode, log_of, run
 from scipy.spatial.transform import Rotation
 
@@ -281,7 +281,7 @@ def test_a_missing_library_is_one_sentence(
 ) -> None:
     code = (
         f"import sys; sys.modules[{module!r}] = None;"
-        "from pelorus.cli import main; sys.exit(main(sys.argv[1:]))"
+        "from pelorus.commands.cli import main; sys.exit(main(sys.argv[1:]))"
     )
     out = tmp_path / "out"
     command = [sys.executable, "-c", code, "view", str(log), option, str(out)]

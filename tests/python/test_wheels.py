@@ -16,7 +16,8 @@ from pathlib import Path
 
 import pytest
 from draws import long_run
-from pelorus import __version__, native
+from pelorus import __version__
+from pelorus.native import binding
 from PIL import Image
 
 pytest.importorskip("ziglang")
@@ -73,8 +74,8 @@ def unpacked(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def names() -> list[str]:
     """What Python looks for in the library."""
-    fixed = [f"plr_filter_{name}" for name in native.SIGNATURES]
-    return [*fixed, *(name for name, _, _ in native.OTHER_SIGNATURES)]
+    fixed = [f"plr_filter_{name}" for name in binding.SIGNATURES]
+    return [*fixed, *(name for name, _, _ in binding.OTHER_SIGNATURES)]
 
 
 def test_the_wheel_is_of_windows_and_of_no_python(wheel: Path, unpacked: Path) -> None:
@@ -87,7 +88,7 @@ def test_the_wheel_is_of_windows_and_of_no_python(wheel: Path, unpacked: Path) -
     for name in found:
         assert (unpacked / "pelorus/native" / name).read_bytes()[:2] == b"MZ"
     inside = zipfile.ZipFile(wheel).namelist()
-    assert "pelorus/cli.py" in inside
+    assert "pelorus/commands/cli.py" in inside
     assert not [name for name in inside if name.endswith(".so")]
 
 

@@ -12,18 +12,18 @@ import pytest
 from bags import Recorder
 from converted import Run, messages_of
 from draws import draws
-from pelorus import se3
 from pelorus.converters import wheels
 from pelorus.converters.wheels import STANDSTILL, WHEEL, Rolling
-from pelorus.frames import Header, Pose, Process, Reading, Twist
-from pelorus.layout import Floats, unpack_symmetric
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.readings import Sensing
-from pelorus.simulation.settings import Span
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.tracks import Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.readings import Sensing
+from pelorus.simulate.settings import Span
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.frames import Header, Pose, Process, Reading, Twist
+from pelorus.wire.layout import Floats, unpack_symmetric
 from replay_drive import judged, run
 from scipy.spatial.transform import Rotation
 from test_convert_csv import csv_files, write_csv

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from converted import messages_of
 from draws import draws
-from pelorus.calibrated import Calibrated
-from pelorus.frames import Pose, Report
-from pelorus.layout import unpack_symmetric
-from pelorus.reason import Reason
-from pelorus.recording import Recording
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.readings import Sensing
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.tracks import Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.readings import Sensing
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire.calibrated import Calibrated
+from pelorus.wire.frames import Pose, Report
+from pelorus.wire.layout import unpack_symmetric
+from pelorus.wire.reason import Reason
 from replay_drive import run
 from scipy.spatial.transform import Rotation
 

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus import cobs, schema, wire
-from pelorus.calibrated import Calibrated
 from pelorus.errors import PelorusError
-from pelorus.evidence import Evidence, EvidenceFlag
-from pelorus.frames import (
+from pelorus.wire import cobs, framing, schema
+from pelorus.wire.calibrated import Calibrated
+from pelorus.wire.evidence import Evidence, EvidenceFlag
+from pelorus.wire.frames import (
     NOT_SEEN_PX,
     Camera,
     Config,
@@ -43,9 +43,10 @@ from pelorus.frames import (
     TruthKnows,
     Twist,
 )
-from pelorus.layout import MalformedPayload, row_type
-from pelorus.schema import SENSORS
-from pelorus.wire import KINDS, Counts, Reader, Received, VersionError, Writer
+from pelorus.wire.framing import KINDS, Counts, Reader, Received, VersionError, Writer
+from pelorus.wire.image import RigMessage, Side, TimedPair, bands_of, pairs_of
+from pelorus.wire.layout import MalformedPayload, row_type
+from pelorus.wire.schema import SENSORS
 
 CHANCE = np.random.default_rng(11)
 R = np.linalg.qr(CHANCE.normal(size=(3, 3)))[0]
@@ -78,6 +79,28 @@ MESSAGES: list[Message] = [
     End(1, 2, 3, 4, 5, 6, 63, (7, 8, 9, 10, 11), 12, 13),
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
     Reading(10, SENSORS["wheel"], 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
+    *bands_of(13, Side.RIGHT, np.arange(600, dtype=np.uint16).astype(np.uint8).reshape(20, 30)),
+    RigMessage(
+        752,
+        480,
+        1,
+        458.5,
+        457.5,
+        367.5,
+        248.5,
+        2,
+        457.5,
+        456.5,
+        379.5,
+        255.5,
+        CHANCE.normal(size=8),
+        CHANCE.normal(size=8),
+        R,
+        CHANCE.normal(size=3),
+        2e-5,
+        120,
+        60,
+    ),
     Imu(11, CHANCE.normal(size=(1, 3)), CHANCE.normal(size=(1, 3))),
     Imu(11, CHANCE.normal(size=(20, 3)), CHANCE.normal(size=(20, 3)), 2_500_000),
     Calibrated(12, 5, Camera(1.5, 2.5, 3.5, 4.5, 0.1), R, np.ones(3), np.arange(11.0), np.ones(11)),
@@ -99,11 +122,13 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.READING: [58],
     Kind.IMU: [13 + 24 * n for n in (1, 20)],
     Kind.CALIBRATION: [250],
+    Kind.IMAGE: [19 + n for n in (568, 32)],
+    Kind.RIG: [306],
 }
 
 
 def stream_of(messages: Sequence[Message]) -> bytes:
-    return b"".join(wire.encode(message, k) for k, message in enumerate(messages))
+    return b"".join(framing.encode(message, k) for k, message in enumerate(messages))
 
 
 def read(data: bytes, piece: int = 1 << 20) -> tuple[list[Received], Counts]:
@@ -158,13 +183,13 @@ def test_a_frame_is_these_bytes() -> None:
     crc = zlib.crc32(content)
     assert zlib.crc32(b"123456789") == 0xCBF43926  # the CRC's published check value
     expected = cobs.encode(content + crc.to_bytes(4, "little")) + b"\0"
-    assert wire.encode(Text("hi"), 0x1234) == expected
-    assert wire.encode(Text("hi"), 0x11234) == expected  # the sequence is mod 2^16
+    assert framing.encode(Text("hi"), 0x1234) == expected
+    assert framing.encode(Text("hi"), 0x11234) == expected  # the sequence is mod 2^16
 
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 8, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 9, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:211] == "Straße 7".encode()
     assert np.array_equal(np.frombuffer(header, "<f8", 6, 211), np.full(6, -1.0))
     assert header[259] == Process.TWIST
@@ -240,14 +265,14 @@ def test_noise_and_empty_frames_before_the_first_delimiter_cost_nothing() -> Non
 
 def test_gaps_of_the_sequence_are_counted_over_its_end() -> None:
     sequence = [0, 1, 5, 65534, 2, 3]  # 3 missing; a step back; 65535, 0 and 1 missing
-    data = b"".join(wire.encode(Twist(k), s) for k, s in enumerate(sequence))
+    data = b"".join(framing.encode(Twist(k), s) for k, s in enumerate(sequence))
     assert read(data)[1].missing == 3 + 0 + 3
-    assert read(wire.encode(Twist(1), 4))[1].missing == 4  # 0 is expected first
-    assert read(stream_of([Twist(1)] * 3) + wire.encode(Twist(2), 0))[1].missing == 0
+    assert read(framing.encode(Twist(1), 4))[1].missing == 4  # 0 is expected first
+    assert read(stream_of([Twist(1)] * 3) + framing.encode(Twist(2), 0))[1].missing == 0
 
 
 def test_an_unknown_kind_is_skipped_and_counted_and_takes_part_in_the_sequence() -> None:
-    data = wire.encode(Twist(1), 0) + framed(b"\x63\x01\x00abc") + wire.encode(Twist(2), 2)
+    data = framing.encode(Twist(1), 0) + framed(b"\x63\x01\x00abc") + framing.encode(Twist(2), 2)
     received, counts = read(data)
     assert len(received) == 2
     assert (counts.unknown, counts.missing, counts.damaged) == (1, 0, 0)
@@ -375,12 +400,12 @@ def test_a_later_major_version_ends_the_reading(tmp_path: Path) -> None:
     path = tmp_path / "future.plr"
     path.write_bytes(framed(b"\x01\0\0" + payload))
     with pytest.raises(VersionError, match=r"future\.plr: byte 0: .*version 2.*up to 1"):
-        wire.read_file(path)
+        framing.read_file(path)
     assert read(framed(b"\x01\0\0\x01\x09" + payload[2:]))[1].clean  # a later minor one is fine
 
 
 def test_a_frame_without_end_is_given_up_once_and_reading_goes_on() -> None:
-    endless = b"\x7f" * (wire.STUFFED_BYTES_MAX * 3)
+    endless = b"\x7f" * (framing.STUFFED_BYTES_MAX * 3)
     for piece in (1 << 16, 1 << 24):
         received, counts = read(endless + b"\0" + stream_of([Twist(4)]), piece)
         assert [r.message for r in received] == [Twist(4)]
@@ -420,18 +445,47 @@ def test_a_file_without_a_frame_says_so(tmp_path: Path, content: bytes, said: st
     path = tmp_path / "x.plr"
     path.write_bytes(content)
     with pytest.raises(PelorusError, match=said):
-        wire.read_file(path)
+        framing.read_file(path)
     with pytest.raises(PelorusError, match="cannot be read"):
-        wire.read_file(tmp_path / "absent.plr")
+        framing.read_file(tmp_path / "absent.plr")
 
 
 def test_twenty_megabytes_take_seconds() -> None:
     frame = stereo(400)
-    data = wire.encode(frame, 0)
+    data = framing.encode(frame, 0)
     count = 20_000_000 // len(data)
-    data = b"".join(wire.encode(frame, k) for k in range(count))
+    data = b"".join(framing.encode(frame, k) for k in range(count))
     began = time.process_time()
     received, counts = read(data, 1 << 16)
     assert time.process_time() - began < 10
     assert len(received) == count
     assert counts.clean
+
+
+def picture(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, (60, 80), dtype=np.uint8)
+
+
+def test_pictures_come_back_from_their_bands() -> None:
+    both = [
+        *bands_of(5, Side.LEFT, picture(1)),
+        *bands_of(6, Side.RIGHT, picture(2)),
+        *bands_of(9, Side.RIGHT, picture(4)),
+        *bands_of(9, Side.LEFT, picture(3)),
+    ]
+    received, counts = read(stream_of(both))
+    assert counts.clean
+    first, second = pairs_of(frame.message for frame in received)
+    assert (first.t_ns, first.t_right_ns, second.t_ns) == (5, 6, 9)
+    assert (first.left == picture(1)).all()
+    assert (first.right == picture(2)).all()
+    assert (second.left == picture(3)).all()
+
+
+def test_a_picture_with_a_missing_or_a_disordered_band_is_left_out() -> None:
+    bands = list(bands_of(5, Side.LEFT, picture(1)))
+    whole = list(bands_of(5, Side.RIGHT, picture(2)))
+    assert not list(pairs_of([*bands[:3], *bands[4:], *whole]))
+    assert not list(pairs_of([bands[1], bands[0], *bands[2:], *whole]))
+    again: list[TimedPair] = list(pairs_of([*bands[:3], *bands, *whole]))
+    assert len(again) == 1

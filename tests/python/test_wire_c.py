@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from pelorus import cobs, frames, wire
-from pelorus.frames import Kind, Message
+from pelorus.wire import cobs, frames, framing
+from pelorus.wire.frames import Kind, Message
 from wire_messages import MAKERS, messages_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,7 +67,7 @@ def echo(tmp_path_factory: pytest.TempPathFactory) -> EchoFunction:
 def written(messages: Iterable[Message]) -> bytes:
     """The stream of a Python writer, closed by END."""
     stream = io.BytesIO()
-    writer = wire.Writer(stream)
+    writer = framing.Writer(stream)
     for message in messages:
         writer.write(message)
     writer.end()
@@ -80,19 +80,19 @@ def framed(kind: int, sequence: int, payload: bytes) -> bytes:
     return cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + b"\0"
 
 
-def read(stream: bytes) -> tuple[list[wire.Received], wire.Counts]:
-    reader = wire.Reader()
+def read(stream: bytes) -> tuple[list[framing.Received], framing.Counts]:
+    reader = framing.Reader()
     received = list(reader.feed(stream))
     return received, reader.counts
 
 
-def payloads(received: Sequence[wire.Received]) -> list[tuple[Kind, bytes]]:
+def payloads(received: Sequence[framing.Received]) -> list[tuple[Kind, bytes]]:
     """All but END, whose counts are the writer's own."""
     messages = [item.message for item in received]
     return [(m.kind, m.pack()) for m in messages if m.kind is not Kind.END]
 
 
-def assert_read_alike(echoed: Echo, stream: bytes) -> wire.Counts:
+def assert_read_alike(echoed: Echo, stream: bytes) -> framing.Counts:
     """Both readers gave the same messages and counted the same."""
     received, counts = read(stream)
     assert echoed.status == 0
@@ -272,7 +272,7 @@ def test_both_refuse_a_later_major_version(echo: EchoFunction) -> None:
     echoed = echo(stream)
     assert echoed.status == FUTURE
     assert echoed.stream == b""
-    with pytest.raises(wire.VersionError):
+    with pytest.raises(framing.VersionError):
         read(stream)
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pelorus import frames
-from pelorus.frames import Message
+from pelorus.wire import frames, image
+from pelorus.wire.frames import Message
 
 EXTREMES = np.array(
     [np.nan, np.inf, -np.inf, 1.7976931348623157e308, -2.2e-308, 5e-324, -0.0, 0.0, 0.1, -1e17]
@@ -190,6 +190,24 @@ def an_imu(random: np.random.Generator) -> Message:
     )
 
 
+def an_image(random: np.random.Generator) -> Message:
+    count = int(random.choice([1, 160, image.BAND_PIXELS]))
+    pixels = random.integers(0, 256, count, dtype=np.uint8)
+    side = image.Side(int(random.integers(2)))
+    size = whole(random, 16), whole(random, 16)
+    return image.Image(whole(random, 64), side, *size, whole(random, 32), pixels)
+
+
+def a_rig(random: np.random.Generator) -> Message:
+    models = random.integers(3, size=2).tolist()
+    lenses = reals(random, 2, 4).tolist()
+    return image.RigMessage(
+        whole(random, 16), whole(random, 16), models[0], *lenses[0], models[1], *lenses[1],
+        reals(random, 8), reals(random, 8), reals(random, 3, 3), reals(random, 3),
+        float(reals(random)), whole(random, 16), whole(random, 16),
+    )  # fmt: skip
+
+
 MAKERS = [
     a_header,
     a_config,
@@ -204,6 +222,8 @@ MAKERS = [
     a_state,
     a_reading,
     an_imu,
+    an_image,
+    a_rig,
 ]
 
 

@@ -29,8 +29,8 @@ import judge  # noqa: E402
 from pelorus.check import checked  # noqa: E402
 from pelorus.check.options import Settings, options_of  # noqa: E402
 from pelorus.commands.choices import settings_given  # noqa: E402
-from pelorus.layout import Floats  # noqa: E402
-from pelorus.recording import Recording  # noqa: E402
+from pelorus.io.recording import Recording  # noqa: E402
+from pelorus.wire.layout import Floats  # noqa: E402
 
 WRONG_MOST = 3.0  # times, either way
 Chance = np.random.Generator

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 from judge import DATA, DRIVES, KITTI_07, Case, Figures, conf, converted, figures, parser_of, run
-from pelorus.trajectory import truth_in
-from pelorus.wire import messages_of
+from pelorus.io.trajectory import truth_in
+from pelorus.wire.framing import messages_of
 
 STARRY = ("starry-night/dataset3.mat", ("starry-night",))
 NOISE_5 = ("--pixel-sigma", "5")

@@ -24,11 +24,11 @@ from pathlib import Path
 
 import numpy as np
 from judge import Case, conf, converted, figures, parser_of, run
-from pelorus import se3
-from pelorus.calibrated import PARTS, last_calibrated
-from pelorus.frames import End, Header, Message, Stereo, Truth
-from pelorus.layout import Floats
-from pelorus.wire import messages_of, write_file
+from pelorus.math import se3
+from pelorus.wire.calibrated import PARTS, last_calibrated
+from pelorus.wire.frames import End, Header, Message, Stereo, Truth
+from pelorus.wire.framing import messages_of, write_file
+from pelorus.wire.layout import Floats
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 

@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 from judge import Case, conf, converted, figures, parser_of, run
 from numpy.typing import NDArray
-from pelorus.evaluation import assess, by_imu
-from pelorus.frames import End, Header, Message, Stereo, Truth
-from pelorus.layout import Floats
-from pelorus.trajectory import estimate_in, filled, truth_in
-from pelorus.wire import messages_of, write_file
+from pelorus.evaluate.evaluation import assess, by_imu
+from pelorus.io.trajectory import estimate_in, filled, truth_in
+from pelorus.wire.frames import End, Header, Message, Stereo, Truth
+from pelorus.wire.framing import messages_of, write_file
+from pelorus.wire.layout import Floats
 
 DRIVES = ("udel_gore_zupt", "tum_corridor1")
 OFFERED, SECONDS, DEPTHS_M = 250, 120.0, (5.0, 7.0)

@@ -23,14 +23,14 @@ from typing import NamedTuple
 import numpy as np
 from injected_events import EVENTS, Event, Messages, S, moving
 from judge import DATA, cases, converted, parser_of, run
-from pelorus import schema
+from pelorus.evaluate.health import GOOD
 from pelorus.explain import Explanation, explain
 from pelorus.explain.incident import Cause, Incident
-from pelorus.frames import Kind, Process, Stereo
-from pelorus.health import GOOD
-from pelorus.simulation.imu import SimulatedImu
-from pelorus.simulation.simulate import Options, simulate
-from pelorus.wire import header_of_messages, messages_of, write_file
+from pelorus.simulate.imu import SimulatedImu
+from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire import schema
+from pelorus.wire.frames import Kind, Process, Stereo
+from pelorus.wire.framing import header_of_messages, messages_of, write_file
 
 WINDOW_S = 60.0
 WITHIN_S = 1.0

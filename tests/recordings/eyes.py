@@ -25,17 +25,17 @@ from pathlib import Path
 import judge
 import numpy as np
 from numpy.typing import NDArray
-from pelorus import trajectory
 from pelorus.converters import euroc, streams
 from pelorus.converters.streams import Asked, Pictures, Readings, Streams
-from pelorus.eyes import Tracker
-from pelorus.frames import Camera
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.recording import Recording
+from pelorus.io import trajectory
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math.inertial import Inertial
+from pelorus.math.motion import Times
 from pelorus.rig.lens import Lens
-from pelorus.tracks import Tracks
+from pelorus.tracker import Tracker
+from pelorus.wire.frames import Camera
+from pelorus.wire.layout import Floats
 from scipy.spatial.transform import Rotation
 
 FOLDER = "images/euroc-mh01-start"
@@ -97,9 +97,9 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
         image_width_px=rig.left.width_px, image_height_px=rig.left.height_px,
     )  # fmt: skip
     of_tracks = replace(found, frames=streams.RawTracks(Path(), t_ns, tracks))
-    made = streams._with_motion(header, of_tracks, t_ns, tracks)
+    made = streams.with_motion(header, of_tracks, t_ns, tracks)
     assert found.truth is not None
-    truth = streams._at_frames(found.truth, t_ns, found.motion)
+    truth = streams.at_frames(found.truth, t_ns, found.motion)
     lengths = np.bincount(id)
     return made.with_truth(truth.t_ns, truth.poses), float(lengths[lengths > 0].mean())
 

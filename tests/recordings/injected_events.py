@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from pelorus.frames import Imu, Kind, Message, Stereo, Truth, Twist
+from pelorus.wire.frames import Imu, Kind, Message, Stereo, Truth, Twist
 
 S = 1_000_000_000
 Messages = list[Message]

@@ -38,14 +38,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pelorus import schema
-from pelorus.evaluation import assess, by_imu
-from pelorus.frames import Kind, Message, Report
-from pelorus.health import GOOD, NOT_STARTED, time_line
-from pelorus.layout import Floats
-from pelorus.road import compare, read_road
-from pelorus.trajectory import estimate_in, filled, truth_in
-from pelorus.wire import messages_of
+from pelorus.evaluate.evaluation import assess, by_imu
+from pelorus.evaluate.health import GOOD, NOT_STARTED, time_line
+from pelorus.evaluate.road import compare, read_road
+from pelorus.io.trajectory import estimate_in, filled, truth_in
+from pelorus.wire import schema
+from pelorus.wire.frames import Kind, Message, Report
+from pelorus.wire.framing import messages_of
+from pelorus.wire.layout import Floats
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT / "../shared/data"))

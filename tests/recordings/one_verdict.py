@@ -33,7 +33,7 @@ sys.path.insert(0, str(ROOT / "tests/python"))
 import robots  # noqa: E402 - what the tests drive
 import verdicts  # noqa: E402
 from pelorus.check.verdict import VERDICTS  # noqa: E402
-from pelorus.cli import main as pelorus  # noqa: E402
+from pelorus.commands.cli import main as pelorus  # noqa: E402
 from pelorus.converters.streams import converted  # noqa: E402
 
 SAID = re.compile(f"^(?:{'|'.join(VERDICTS.values())})(?:, to [0-9.]+% of the way)?$", re.MULTILINE)

@@ -21,10 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 from judge import DATA, by_real_imu, converted
-from pelorus.frames import Imu, Message
-from pelorus.layout import Floats
-from pelorus.trajectory import truth_in
-from pelorus.wire import messages_of
+from pelorus.io.trajectory import truth_in
+from pelorus.wire.frames import Imu, Message
+from pelorus.wire.framing import messages_of
+from pelorus.wire.layout import Floats
 from scipy.spatial.transform import Rotation, Slerp
 
 WINDOW_S, FRAME_S = 2.0, 0.05

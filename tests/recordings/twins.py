@@ -26,10 +26,11 @@ from typing import NamedTuple
 
 import numpy as np
 from judge import ROOT, run
-from pelorus import schema, se3
-from pelorus.frames import Kind, Message, Pose, Report
-from pelorus.layout import Floats, unpack_symmetric
-from pelorus.se3 import Poses
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire import schema
+from pelorus.wire.frames import Kind, Message, Pose, Report
+from pelorus.wire.layout import Floats, unpack_symmetric
 
 PROGRAMS = ("pelorus-replay", "pelorus-replay-f64")
 PARTED = 0.1  # of a sigma

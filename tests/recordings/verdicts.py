@@ -33,14 +33,14 @@ sys.path.insert(0, str(ROOT / "tests/python"))
 import everyday  # noqa: E402 - what the tests drive
 import injected  # noqa: E402
 import robots  # noqa: E402
-from pelorus import wire  # noqa: E402
 from pelorus.check import checked  # noqa: E402
 from pelorus.check.verdict import Grade  # noqa: E402
-from pelorus.cli import main as pelorus  # noqa: E402
+from pelorus.commands.cli import main as pelorus  # noqa: E402
 from pelorus.converters.streams import converted  # noqa: E402
 from pelorus.faults.named import judged_of  # noqa: E402
-from pelorus.recording import Recording  # noqa: E402
-from pelorus.trajectory import truth_in  # noqa: E402
+from pelorus.io.recording import Recording  # noqa: E402
+from pelorus.io.trajectory import truth_in  # noqa: E402
+from pelorus.wire import framing  # noqa: E402
 
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT / "../shared/data"))
 RIGHT_SHARE, RIGHT_M = 0.005, 0.02  # of the way; or, of one that hardly moves, so far
@@ -140,7 +140,7 @@ def verdict_of(name: str, path: Path, program: Path) -> tuple[bool, bool]:
     with tempfile.TemporaryDirectory() as folder:
         found = checked.check(program, path, {}, Path(folder))
     figures = {title: after for title, _, after in found.rows}
-    truth = truth_in(wire.messages_of(path))
+    truth = truth_in(framing.messages_of(path))
     way = (
         0.0 if truth is None else float(np.sum(np.linalg.norm(np.diff(truth[1].p, axis=0), axis=1)))
     )

@@ -62,7 +62,7 @@ static void test_a_measured_position_is_not_given_up_for_an_anchor(void) {
     imu_rig_begin(IMU_RIG_IN_MOTION, 1);
     place(1);
     imu_rig_fly(10);
-    TEST_ASSERT_EQUAL_UINT8(1, f->source.inertial.started);
+    TEST_ASSERT_TRUE(f->source.inertial.phase >= PLR_IMU_UNSETTLED);
     measure_position(0.4);
     imu_rig_fly(30); /* past the time of the anchor */
     TEST_ASSERT_TRUE(position_sigma() > 0.2);
@@ -124,7 +124,7 @@ static void test_a_known_landmark_has_to_wait_for_the_start(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, plr_filter_insert_known(f, &known));
     TEST_ASSERT_EQUAL_UINT(0, plr_filter_landmark_count(f));
     imu_rig_fly(12);
-    TEST_ASSERT_EQUAL_UINT8(1, f->source.inertial.started);
+    TEST_ASSERT_TRUE(f->source.inertial.phase >= PLR_IMU_UNSETTLED);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_insert_known(f, &known));
 }
 
@@ -152,7 +152,7 @@ static void test_a_jump_of_the_clock_is_no_time_since_the_start(void) {
     for (int forth = 0; forth < 2; forth++) {
         imu_rig_begin(IMU_RIG_IN_MOTION, 4);
         imu_rig_fly(15);
-        TEST_ASSERT_EQUAL_UINT8(0, f->source.inertial.anchored);
+        TEST_ASSERT_EQUAL_UINT8(PLR_IMU_UNSETTLED, f->source.inertial.phase);
         const plr_time_ns since = f->belief.t_ns - f->source.inertial.started_ns;
         TEST_ASSERT_EQUAL_INT(PLR_OK,
                               plr_filter_resume(f, forth ? f->belief.t_ns + year : 1, NULL));
@@ -160,6 +160,7 @@ static void test_a_jump_of_the_clock_is_no_time_since_the_start(void) {
         const plr_frame look = imu_flight_look(&imu_rig.flight);
         const plr_frame next = {f->belief.t_ns + 1, PLR_NO_BUDGET, look.count, look.observations};
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &next, NULL));
-        TEST_ASSERT_EQUAL_UINT8(0, f->source.inertial.anchored); /* two seconds have not passed */
+        TEST_ASSERT_EQUAL_UINT8(PLR_IMU_UNSETTLED,
+                                f->source.inertial.phase); /* two seconds have not passed */
     }
 }

@@ -78,7 +78,7 @@ static void test_innovations_that_lean_within_the_gate_are_found_out(void) {
         plr_real e[3];
         for (int r = 0; r < 3; r++)
             e[r] = (plr_real)(rng_normal(&chance) + (r == 0 ? 1.4 : 0));
-        plr_track_add(&slot, e);
+        plr_track_add(&slot, 0, e);
     }
     TEST_ASSERT_LESS_THAN_INT(60, frames);
 }
@@ -90,7 +90,7 @@ static void test_white_innovations_are_not(void) {
         plr_real e[3];
         for (int r = 0; r < 3; r++)
             e[r] = (plr_real)rng_normal(&chance);
-        plr_track_add(&slot, e);
+        plr_track_add(&slot, 0, e);
     }
     TEST_ASSERT_EQUAL_UINT8(0, slot.moving);
 }
@@ -172,15 +172,15 @@ static void test_a_good_track_that_is_little_off_does_not(void) {
     plr_track_count(&lost, PLR_GATE_FAR);
     plr_track_count(&moved, PLR_GATE_REJECTED);
     for (int k = 1; k < 8; k++) {
-        TEST_ASSERT_FALSE(plr_track_may_restart(&lost));
+        TEST_ASSERT_FALSE(plr_track_may_restart(&lost, 0));
         plr_track_count(&lost, PLR_GATE_REJECTED);
         plr_track_count(&moved, PLR_GATE_REJECTED);
     }
-    TEST_ASSERT_TRUE(plr_track_may_restart(&lost));
-    TEST_ASSERT_FALSE(plr_track_may_restart(&moved));
+    TEST_ASSERT_TRUE(plr_track_may_restart(&lost, 0));
+    TEST_ASSERT_FALSE(plr_track_may_restart(&moved, 0));
 }
 
 static void test_far_off_is_ten_sigmas(void) {
-    TEST_ASSERT_EQUAL_INT(PLR_GATE_REJECTED, plr_gate_rejection(PLR_R(99)));
-    TEST_ASSERT_EQUAL_INT(PLR_GATE_FAR, plr_gate_rejection(PLR_R(101)));
+    TEST_ASSERT_EQUAL_INT(PLR_GATE_REJECTED, plr_gate_rejection(0, PLR_R(99)));
+    TEST_ASSERT_EQUAL_INT(PLR_GATE_FAR, plr_gate_rejection(0, PLR_R(101)));
 }

@@ -49,7 +49,7 @@ static void test_a_doubt_at_the_beginning_ends_though_the_biases_are_unknown(voi
     for (int i = 3; i < 6; i++)
         rig.options.bias[i] = 0.015;
     rig_begin();
-    plr_supervise_begun_anew(&rig.filter.supervisor, false);
+    (void)plr_supervise_begun_anew(&rig.filter.supervisor, false);
     rig.filter.supervisor.doubted_frames = 1;
     reseal(&rig.filter);
     unsigned frames = 0;

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus.cli import main
-from pelorus.frames import Header, Imu, Stereo
-from pelorus.wire import messages_of
+from pelorus.commands.cli import main
+from pelorus.wire.frames import Header, Imu, Stereo
+from pelorus.wire.framing import messages_of
 from robot import Played, Robot, imu_message, info_message, tracks_message, transform_message
 from tf2_msgs.msg import TFMessage
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Recorded, mounted
-from pelorus.cli import main
-from pelorus.frames import Pose
-from pelorus.wire import messages_of
+from pelorus.commands.cli import main
+from pelorus.wire.frames import Pose
+from pelorus.wire.framing import messages_of
 from pelorus_msgs.msg import StereoTracks
 from robot import Played, Robot, image_message, stamped
 from sensor_msgs.msg import Image, Imu

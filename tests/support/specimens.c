@@ -9,6 +9,7 @@
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/polar.h"
+#include "supervise/supervise.h"
 #include "support/matrices.h"
 #include "support/reseal.h"
 #include "support/rigid.h"
@@ -198,9 +199,12 @@ void specimen_put_rows(double *H, unsigned n, const plr_rows *rows) {
 }
 
 plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
+    plr_supervisor asked = f->supervisor;
+    const plr_picture_evidence nothing = {0};
+    const bool opens = plr_supervise_picture(&asked, &nothing).opens_fixed_gate;
     plr_measurement m;
     plr_verdict none = {.accepted = false};
-    return plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m) ? plr_gate_judge(f, &m)
+    return plr_stereo_measure(&f->belief, &f->camera, slot, seen, &m) ? plr_gate_judge(f, opens, &m)
                                                                       : none;
 }
 

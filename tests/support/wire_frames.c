@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "record/codec.h"
 #include "record/messages.h"
 
 byte_sink byte_sink_over(uint8_t *bytes, size_t capacity) {
@@ -94,21 +95,13 @@ size_t wire_payload(const plr_message *message, uint8_t *payload, size_t capacit
     return length;
 }
 
-/* The next n bytes of a payload. */
-static bool take(void *context, uint8_t *bytes, unsigned n) {
-    const uint8_t **at = context;
-    memcpy(bytes, *at, n);
-    *at += n;
-    return true;
-}
-
 plr_status wire_read_payload(plr_kind kind, const uint8_t *payload, size_t n, plr_message *m) {
     static plr_observation observations[PLR_WIRE_MAX_OBSERVATIONS];
     static uint8_t room_at_end[WIRE_BUFFER_SIZE + 4096];
     const plr_observation_room room = {observations, PLR_WIRE_MAX_OBSERVATIONS};
     TEST_ASSERT_LESS_OR_EQUAL_size_t(sizeof room_at_end, n);
     const uint8_t *at = room_at_end + sizeof room_at_end - n;
-    plr_codec codec = {.direction = PLR_CODEC_READ, .move = take, .context = &at, .left = n};
+    plr_codec codec = {.direction = PLR_CODEC_READ, .move = plr_codec_take, .context = &at, .left = n};
     memcpy(room_at_end + sizeof room_at_end - n, payload, n);
     memset(m, 0, sizeof *m);
     m->kind = kind;

@@ -183,10 +183,60 @@ static void same_imu(const plr_imu_message *e, const plr_imu_message *a) {
         SAME(readings[i]);
 }
 
+static void same_image(const plr_image_message *e, const plr_image_message *a) {
+    SAME(t_ns);
+    SAME(side);
+    SAME(width_px);
+    SAME(height_px);
+    SAME(first_px);
+    SAME(count);
+    TEST_ASSERT_EQUAL_UINT8_ARRAY(e->pixels, a->pixels, e->count);
+}
+
+static void same_lens(const plr_lens *e, const plr_lens *a) {
+    SAME(model);
+    SAME(width_px);
+    SAME(height_px);
+    SAME(fx_px);
+    SAME(fy_px);
+    SAME(cx_px);
+    SAME(cy_px);
+    SAME(k);
+}
+
+static void same_rig(const plr_rig *e, const plr_rig *a) {
+    same_lens(&e->left, &a->left);
+    same_lens(&e->right, &a->right);
+    SAME(T_RL);
+    SAME(row_time_s);
+    SAME(disparity_max_px);
+    SAME(tracks);
+}
+
+static void same_truth(const plr_truth *e, const plr_truth *a) {
+    SAME(t_ns);
+    SAME(T_WB);
+    SAME(v_B_mps);
+    SAME(bias);
+    SAME(knows);
+}
+
+static void same_text(const plr_text *e, const plr_text *a) {
+    TEST_ASSERT_EQUAL_UINT8(e->severity, a->severity);
+    TEST_ASSERT_EQUAL_STRING(e->text, a->text);
+}
+
 static void same_state(const plr_state_message *e, const plr_state_message *a) {
     SAME(t_ns);
     SAME(action);
     SAME(moved_variance);
+}
+
+static void same_pictures(const plr_message *e, const plr_message *a) {
+    if (e->kind == PLR_KIND_IMAGE)
+        same_image(&e->as.image, &a->as.image);
+    else
+        same_rig(&e->as.rig, &a->as.rig);
 }
 
 void wire_assert_same(const plr_message *e, const plr_message *a) {
@@ -208,11 +258,7 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         same_stereo(&e->as.stereo, &a->as.stereo);
         break;
     case PLR_KIND_TRUTH:
-        SAME(as.truth.t_ns);
-        SAME(as.truth.T_WB);
-        SAME(as.truth.v_B_mps);
-        SAME(as.truth.bias);
-        SAME(as.truth.knows);
+        same_truth(&e->as.truth, &a->as.truth);
         break;
     case PLR_KIND_LANDMARK:
         same_landmark(&e->as.landmark, &a->as.landmark);
@@ -230,8 +276,7 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         same_evidence(&e->as.evidence, &a->as.evidence);
         break;
     case PLR_KIND_TEXT:
-        TEST_ASSERT_EQUAL_UINT8(e->as.text.severity, a->as.text.severity);
-        TEST_ASSERT_EQUAL_STRING(e->as.text.text, a->as.text.text);
+        same_text(&e->as.text, &a->as.text);
         break;
     case PLR_KIND_END:
         same_end(&e->as.end, &a->as.end);
@@ -244,6 +289,10 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         break;
     case PLR_KIND_IMU:
         same_imu(&e->as.imu, &a->as.imu);
+        break;
+    case PLR_KIND_IMAGE:
+    case PLR_KIND_RIG:
+        same_pictures(e, a);
         break;
     case PLR_KIND_NONE:
         break;

@@ -290,6 +290,42 @@ static void make_calibration(plr_calibration_result *m, unsigned variant) {
     }
 }
 
+static void make_image(plr_image_message *m, unsigned variant) {
+    static const uint8_t pixels[PLR_WIRE_IMAGE_PIXELS] = {0, 255, 0, 0, 17};
+    m->t_ns = time_of(variant);
+    m->side = whole8(variant, PLR_SIDE_RIGHT, PLR_SIDE_RIGHT);
+    m->width_px = whole16(variant, 160);
+    m->height_px = whole16(variant, 120);
+    m->first_px = whole32(variant, 320);
+    m->count = variant == WIRE_SAMPLE_LEAST  ? 1
+               : variant == WIRE_SAMPLE_MOST ? PLR_WIRE_IMAGE_PIXELS
+                                             : 160;
+    m->pixels = pixels;
+}
+
+static void make_lens(plr_lens *m, unsigned variant, unsigned seed) {
+    m->model = whole8(variant, PLR_LENS_EQUIDISTANT, PLR_LENS_RADTAN);
+    m->width_px = whole16(variant, 752);
+    m->height_px = whole16(variant, 480);
+    fill(&m->fx_px, 4, variant, seed);
+    fill(m->k, 8, variant, seed + 4);
+}
+
+static void make_rig(plr_rig *m, unsigned variant) {
+    make_lens(&m->left, variant, 0);
+    make_lens(&m->right, variant, 12);
+    fill(m->T_RL.R, 9, variant, 24);
+    fill(m->T_RL.p, 3, variant, 33);
+    fill(&m->row_time_s, 1, variant, 36);
+    m->disparity_max_px = whole16(variant, 80);
+    m->tracks = whole16(variant, 50);
+}
+
+static void make_text(plr_text *m, unsigned variant) {
+    m->severity = whole8(variant, PLR_SEVERITY_ERROR, PLR_SEVERITY_WARNING);
+    fill_text(m->text, sizeof m->text, variant);
+}
+
 static void make_twist(plr_twist_message *m, unsigned variant) {
     m->t_ns = time_of(variant);
     fill(m->twist.v_B_mps, 3, variant, 0);
@@ -302,10 +338,15 @@ static void make_end(plr_end *m, unsigned variant) {
         m->arrived[i] = whole32(variant, 70 + i);
 }
 
+static void make_pictures(plr_message *m, unsigned variant) {
+    if (m->kind == PLR_KIND_IMAGE)
+        make_image(&m->as.image, variant);
+    else
+        make_rig(&m->as.rig, variant);
+}
+
 plr_message wire_sample(plr_kind kind, unsigned variant) {
-    plr_message m;
-    memset(&m, 0, sizeof m);
-    m.kind = kind;
+    plr_message m = {.kind = kind};
     switch (kind) {
     case PLR_KIND_HEADER:
         make_header(&m.as.header, variant);
@@ -341,8 +382,7 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         make_evidence(&m.as.evidence, variant);
         break;
     case PLR_KIND_TEXT:
-        m.as.text.severity = whole8(variant, PLR_SEVERITY_ERROR, PLR_SEVERITY_WARNING);
-        fill_text(m.as.text.text, sizeof m.as.text.text, variant);
+        make_text(&m.as.text, variant);
         break;
     case PLR_KIND_STATE:
         make_state(&m.as.state, variant);
@@ -352,6 +392,10 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         break;
     case PLR_KIND_IMU:
         make_imu(&m.as.imu, variant);
+        break;
+    case PLR_KIND_IMAGE:
+    case PLR_KIND_RIG:
+        make_pictures(&m, variant);
         break;
     case PLR_KIND_END:
         make_end(&m.as.end, variant);

@@ -13,13 +13,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from pelorus.frames import Kind, Message
 from pelorus.robot import emulator as emulators
 from pelorus.robot import link as links
 from pelorus.robot import stream
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
-from pelorus.wire import read_file
+from pelorus.wire.frames import Kind, Message
+from pelorus.wire.framing import read_file
 
 # For firmware.stack, which is no part of the package.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))

@@ -7,9 +7,9 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from pelorus.frames import Pose, Stereo
-from pelorus.replay import replayed
-from pelorus.wire import messages_of
+from pelorus.native.replay import replayed
+from pelorus.wire.frames import Pose, Stereo
+from pelorus.wire.framing import messages_of
 
 
 def digest(poses: Iterable[Pose]) -> str:

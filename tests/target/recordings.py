@@ -15,9 +15,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pelorus.frames import Config, End, Header, Kind, Message
-from pelorus.settings import IDS
-from pelorus.wire import Writer, messages_of, read_file, write_file
+from pelorus.wire.frames import Config, End, Header, Kind, Message
+from pelorus.wire.framing import Writer, messages_of, read_file, write_file
+from pelorus.wire.settings import IDS
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))

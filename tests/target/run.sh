@@ -25,10 +25,11 @@ OUTPUT=$LOGS/target-boards.log
 build_firmware() {
     local board targets=()
     if [ "$all" -eq 0 ]; then
-        targets=(boards bringup bench)
+        targets=(boards bringup bench eyes-stm32f405 eyes-replay-stm32f405 eyes-mps2_an500 eyes-replay-mps2_an500)
     else
         for board in "${BOARDS[@]}"; do
             targets+=("pelorus-$board-n32" "bringup-$board" "kernels-$board")
+            case $board in stm32f405 | mps2_an500) targets+=("eyes-$board" "eyes-replay-$board") ;; esac
             [ "$board" != mps2_an500 ] || targets+=("pelorus-$board-n32-f64")
         done
     fi
@@ -64,7 +65,7 @@ heading 'Building firmware (build/robot), and the desktop (build)'
 "$VENV/bin/python" "$ROOT/tests/target/recordings.py" "$ROBOT/recordings" "${long[@]}" \
     >"$LOGS/target-recordings.log" 2>&1 &
 recordings=$!
-if ! { build_firmware && build_replays release; } >"$LOGS/target-build.log" 2>&1; then
+if ! { build_replays release && build_firmware; } >"$LOGS/target-build.log" 2>&1; then
     tail -40 "$LOGS/target-build.log"
     die 'the build failed: the whole of it is in build-logs/target-build.log'
 fi

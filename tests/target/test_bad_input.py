@@ -17,12 +17,12 @@ from pathlib import Path
 import pytest
 from desk import digest
 from gdb_stub import GdbStub, symbol
-from pelorus import cobs
-from pelorus.frames import End, Header, Kind, Message, Pose, Report, Stereo, Text, Truth, Twist
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.robot.stream import Streamer
-from pelorus.wire import DELIMITER, Reader, encode, read_file
+from pelorus.wire import cobs
+from pelorus.wire.frames import End, Header, Kind, Message, Pose, Report, Stereo, Text, Truth, Twist
+from pelorus.wire.framing import DELIMITER, Reader, encode, read_file
 from recordings import first_frames
 
 FRAMES = 24

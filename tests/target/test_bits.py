@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 from desk import desktop_poses, digest
-from pelorus.frames import Pose, Stereo
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.stream import Streamer
-from pelorus.wire import read_file
+from pelorus.wire.frames import Pose, Stereo
+from pelorus.wire.framing import read_file
 
 SLOTS, OBSERVATIONS = 32, 128  # of the images and of the desktop's builds
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"

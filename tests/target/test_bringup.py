@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from pelorus.frames import Text
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
-from pelorus.wire import Reader
+from pelorus.wire.frames import Text
+from pelorus.wire.framing import Reader
 
 HANG_S = 1800.0
 WHOLE_NS = 0.5e9  # many turns of the counter

@@ -8,11 +8,11 @@ import time
 
 import pytest
 from desk import digest
-from pelorus.frames import Header, Kind, Message, Notice, Pose, Report, Stereo, Text, Twist
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.robot.stream import Streamer
-from pelorus.wire import Reader, encode
+from pelorus.wire.frames import Header, Kind, Message, Notice, Pose, Report, Stereo, Text, Twist
+from pelorus.wire.framing import Reader, encode
 from recordings import first_frames
 
 FRAMES = 24

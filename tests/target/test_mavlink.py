@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from pelorus.frames import BodyAxes, Header, Kind, Message, Pose
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.stream import Streamer
-from pelorus.wire import read_file
+from pelorus.wire.frames import BodyAxes, Header, Kind, Message, Pose
+from pelorus.wire.framing import read_file
 from recordings import first_frames
 from scipy.spatial.transform import Rotation
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from desk import digest
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Kind, Message, Pose, Start, State, StateAction, Stereo
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.robot.state import restored, saved
 from pelorus.robot.stream import Streamer, StreamResult
+from pelorus.wire.frames import Header, Kind, Message, Pose, Start, State, StateAction, Stereo
 from recordings import first_frames
 
 FRAMES, CUT, LOST = 30, 12, 5  # LOST frames come between the save and the reset

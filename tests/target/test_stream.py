@@ -21,10 +21,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from desk import digest
-from pelorus.frames import Message, Pose
 from pelorus.robot.emulator import MACHINES, Emulator
 from pelorus.robot.stream import Streamer
-from pelorus.wire import Counts, Writer, read_file
+from pelorus.wire.frames import Message, Pose
+from pelorus.wire.framing import Counts, Writer, read_file
 from recordings import first_frames
 
 FRAMES = 24

@@ -65,8 +65,9 @@ static void test_every_flipped_bit_of_what_outlives_a_call_is_found(void) {
     const size_t P = offsetof(plr_filter, belief.P);
     demand_found(0, sizeof sound.magic);
     demand_found(offsetof(plr_filter, config), offsetof(plr_filter, source.alignment));
-    demand_found(offsetof(plr_filter, motion), offsetof(plr_filter, belief.slots) +
-                                                   sound.belief.count * sizeof *sound.belief.slots);
+    demand_found(offsetof(plr_filter, source.reading_ns),
+                 offsetof(plr_filter, belief.slots) +
+                     sound.belief.count * sizeof *sound.belief.slots);
     demand_found(P, P + plr_packed_row(12 + 3 * sound.belief.count) * sizeof *sound.belief.P);
     demand_found(offsetof(plr_filter, supervisor), sizeof sound);
 }
@@ -93,6 +94,31 @@ static void test_words_that_change_places_are_found(void) {
         P[0] = x;
         P[apart] = y;
     }
+}
+
+/* Of the camera as it is estimated only a frame makes use: a reading does not look at it. */
+static void test_what_a_reading_does_not_use_is_found_by_a_query_and_a_frame(void) {
+    const plr_frame nothing = {.t_ns = rig.world.t_ns, .budget = PLR_NO_BUDGET};
+    plr_calibration_result told;
+    double P_xi[36];
+    flip(offsetof(plr_filter, camera.estimate.t) + 1, 3);
+    rig_twist();
+    TEST_ASSERT_EQUAL_INT(PLR_E_DAMAGED, plr_filter_calibration(&rig.filter, &told));
+    TEST_ASSERT_EQUAL_INT(PLR_E_DAMAGED, plr_filter_update(&rig.filter, &nothing, NULL));
+    memcpy(&rig.filter, &sound, sizeof sound);
+    flip(offsetof(plr_filter, belief.P) + 1, 3);
+    rig_twist();
+    TEST_ASSERT_EQUAL_INT(PLR_E_DAMAGED, plr_filter_pose_covariance(&rig.filter, P_xi));
+}
+
+/* The weighing of a velocity against twists reads the biases' rows of P. */
+static void test_beside_a_velocity_that_is_held_a_twist_looks_at_what_it_is_weighed_by(void) {
+    const plr_twist twist = {{1, 0, 0}, {0, 0, 0}};
+    rig.filter.source.velocities_known = 1;
+    plr_guard_seal_whole(&rig.filter);
+    flip(offsetof(plr_filter, belief.P) + 1, 3);
+    TEST_ASSERT_EQUAL_INT(PLR_E_DAMAGED,
+                          plr_filter_predict(&rig.filter, rig.filter.belief.t_ns + 1, &twist));
 }
 
 /* ---------------------------------------------------------------- what is refused */

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "process/imu_noise.h"
 #include "state/motion.h"
 #include "support/imu_rig.h"
 
@@ -60,4 +61,29 @@ static void test_noise_is_as_stated_unless_the_readings_scatter_by_more(void) {
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 1, turned(0.1 * stated));
     TEST_ASSERT_DOUBLE_WITHIN(0.65, 2.6, turned(1.6 * stated));
     TEST_ASSERT_DOUBLE_WITHIN(25, 100, turned(10 * stated));
+}
+
+/* ---------------------------------------------------------------- two ways to carry it */
+
+static void demand_same(const plr_real *a, const plr_real *b, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        TEST_ASSERT_TRUE(a[i] >= b[i] && a[i] <= b[i]);
+}
+
+static void test_blocks_and_whole_rows_carry_the_noise_to_the_same_numbers(void) {
+    static plr_motion rows, blocks;
+    plr_real F[PLR_CORE_MOVED * PLR_CORE_DIM], reading[2];
+    feed(30, 0.3, 0.04, 2);
+    rows = blocks = f->motion;
+    for (unsigned step = 0; step < 20; step++) {
+        for (unsigned i = 0; i < PLR_CORE_MOVED * PLR_CORE_DIM; i++)
+            F[i] = (plr_real)(0.4 * rng_normal(&chance));
+        reading[0] = (plr_real)rng_uniform(&chance, 0, 1);
+        reading[1] = (plr_real)rng_uniform(&chance, 0, 1);
+        plr_imu_carry_in_rows(&rows, F, reading);
+        plr_imu_carry_by_blocks(&blocks, F, reading);
+        demand_same(rows.Q, blocks.Q, PLR_POSE_SQUARE);
+        demand_same(rows.core.Q_nc, blocks.core.Q_nc, PLR_POSE_DIM * PLR_REST_DIM);
+        demand_same(rows.core.Q_cc, blocks.core.Q_cc, PLR_REST_DIM * PLR_REST_DIM);
+    }
 }

@@ -268,13 +268,13 @@ static void test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start
     double P[36];
     imu_rig_begin(IMU_RIG_IN_MOTION, 3);
     imu_rig_fly(18);
-    TEST_ASSERT_EQUAL_UINT8(0, f->source.inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(PLR_IMU_UNSETTLED, f->source.inertial.phase);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
     TEST_ASSERT_TRUE(P[0] + P[7] + P[14] > 1e-5);
     imu_rig_fly(6);
-    TEST_ASSERT_EQUAL_UINT8(1, f->source.inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(PLR_IMU_SETTLED, f->source.inertial.phase);
     imu_rig_begin(IMU_RIG_IN_MOTION, 3);
-    while (!f->source.inertial.anchored) {
+    while (f->source.inertial.phase != PLR_IMU_SETTLED) {
         imu_rig_readings(IMU_RIG_EVERY);
         imu_rig_frame();
     }

@@ -70,21 +70,21 @@ static void test_before_its_start_it_averages_anew_and_starts_later(void) {
     imu_rig_readings(7);
     restore_from_now();
     fly_both(4, false);
-    TEST_ASSERT_EQUAL_UINT8(1, f->source.inertial.started);
-    TEST_ASSERT_EQUAL_UINT8(0, restored.source.inertial.started);
+    TEST_ASSERT_TRUE(f->source.inertial.phase >= PLR_IMU_UNSETTLED);
+    TEST_ASSERT_FALSE(restored.source.inertial.phase >= PLR_IMU_UNSETTLED);
     TEST_ASSERT_EQUAL_INT(PLR_OK,
                           plr_filter_health(&restored, plr_filter_time(&restored), &health));
     TEST_ASSERT_TRUE(health.reasons & PLR_REASON_NOT_STARTED);
     fly_both(7, false);
-    TEST_ASSERT_EQUAL_UINT8(1, restored.source.inertial.started);
+    TEST_ASSERT_TRUE(restored.source.inertial.phase >= PLR_IMU_UNSETTLED);
 }
 
 static void test_between_a_start_in_motion_and_its_anchor_too(void) {
     imu_rig_begin(IMU_RIG_IN_MOTION, 23);
     imu_rig_fly(12);
-    TEST_ASSERT_EQUAL_UINT8(0, f->source.inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(PLR_IMU_UNSETTLED, f->source.inertial.phase);
     save_restore_and_go_on(15);
-    TEST_ASSERT_EQUAL_UINT8(1, restored.source.inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(PLR_IMU_SETTLED, restored.source.inertial.phase);
 }
 
 static void test_what_it_knows_of_a_faulty_sensor_is_kept(void) {

@@ -227,7 +227,7 @@ static void test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was(v
     }
     desk_run();
     const inertial_result after = inertial_read();
-    TEST_ASSERT_EQUAL_UINT8(PLR_ANCHORED, session.filter.source.inertial.anchored);
+    TEST_ASSERT_EQUAL_UINT8(PLR_IMU_SETTLED, session.filter.source.inertial.phase);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P_now));
     for (int i = 0; i < 3; i++) /* how far it went during the jump, no picture has told */
         TEST_ASSERT_TRUE(P_now[7 * i] > 0.9 * P_then[7 * i]);

@@ -6,6 +6,7 @@
 
 #include "session/phase.h"
 #include "support/cut_drive.h"
+#include "support/wire_samples.h"
 
 enum { KNOWN = 4 };
 
@@ -102,6 +103,8 @@ static const struct {
     {"TRUTH", {{OK, WAITING}, {OK, STARTING}, {OK, REJECTED}, {OK, STARTING}, {OK, RUNNING}, {OK, RUNNING}}},
     {"READING", {{EARLY, WAITING}, {NO_TWIST, STARTING}, {EARLY, REJECTED}, {OK, STARTING}, {NO_TWIST, RUNNING}, {OK, RUNNING}}},
     {"IMU, with process = twist", {{EARLY, WAITING}, {LATE, STARTING}, {EARLY, REJECTED}, {LATE, STARTING}, {LATE, RUNNING}, {LATE, RUNNING}}},
+    {"IMAGE, without eyes", {{EARLY, WAITING}, {LATE, STARTING}, {EARLY, REJECTED}, {LATE, STARTING}, {LATE, RUNNING}, {LATE, RUNNING}}},
+    {"RIG, without eyes", {{EARLY, WAITING}, {OK, READY}, {OK, REJECTED}, {OK, STARTING}, {OK, RESTORED}, {OK, RUNNING}}},
     {"TEXT", {{OK, WAITING}, {OK, READY}, {OK, REJECTED}, {OK, STARTING}, {OK, RESTORED}, {OK, RUNNING}}},
     {"POSE", {{OK, WAITING}, {OK, READY}, {OK, REJECTED}, {OK, STARTING}, {OK, RESTORED}, {OK, RUNNING}}},
     {"END", {{OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}}},
@@ -146,11 +149,15 @@ static plr_message message_of(unsigned row) {
         return message;
     case 13:
         return drive_imu(0.2, 1, 0);
+    case 14:
+        return wire_sample(PLR_KIND_IMAGE, WIRE_SAMPLE_LEAST);
     case 15:
+        return wire_sample(PLR_KIND_RIG, WIRE_SAMPLE_COMMON);
+    case 17:
         message.kind = PLR_KIND_POSE;
         message.as.pose.real_bytes = 8;
         return message;
-    case 16:
+    case 18:
         return end_message();
     default:
         return message;
@@ -250,7 +257,8 @@ static void test_a_message_is_echoed_whether_it_is_used_or_refused(void) {
         {5, PLR_KIND_LANDMARK, 1}, {6, PLR_KIND_LANDMARK, 0}, {7, PLR_KIND_STATE, 1},
         {8, PLR_KIND_STATE, 1},    {9, PLR_KIND_TWIST, 1},    {10, PLR_KIND_STEREO, 1},
         {11, PLR_KIND_TRUTH, 1},   {12, PLR_KIND_READING, 1}, {13, PLR_KIND_IMU, 1},
-        {14, PLR_KIND_TEXT, 1},    {15, PLR_KIND_POSE, 0},
+        {14, PLR_KIND_IMAGE, 0},   {15, PLR_KIND_RIG, 1},     {16, PLR_KIND_TEXT, 1},
+        {17, PLR_KIND_POSE, 0},
     };
     for (unsigned i = 0; i < sizeof tried / sizeof tried[0]; i++)
         for (unsigned phase = 0; phase < PLR_PHASES; phase++) {

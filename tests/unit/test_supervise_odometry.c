@@ -52,6 +52,12 @@ static void end_frame(unsigned used) {
     e.motion.applied = e.motion.outright = false;
 }
 
+/* What is decided before a frame whose picture is new. */
+static plr_picture_decision decided(void) {
+    const plr_picture_evidence nothing = {0};
+    return plr_supervise_picture(&s, &nothing);
+}
+
 static plr_search_decision search(bool outright) {
     const plr_search_evidence found = {10, 0, outright, 0};
     return plr_supervise_search(&s, &found);
@@ -62,7 +68,7 @@ static plr_search_decision search(bool outright) {
 static bool add(const double mean[6], double noise) {
     plr_motion_evidence *m = &e.motion;
     const bool held = search(false).hold_biases;
-    const double w = (double)plr_supervise_weight(&s);
+    const double w = (double)decided().weight;
     m->applied = true;
     m->weight = (plr_real)w;
     for (unsigned k = 0; k < 6; k++) {
@@ -171,8 +177,8 @@ static void test_a_slip_after_agreement_contradicts_within_five_frames_and_once(
 static void test_a_slip_from_the_first_frame_is_told_and_takes_no_weight(void) {
     for (unsigned k = 0; k < 300; k++) {
         add_slip(1);
-        TEST_ASSERT_FALSE(plr_supervise_may_exclude_odometry(&s));
-        TEST_ASSERT_TRUE(plr_supervise_weight(&s) <= 1);
+        TEST_ASSERT_FALSE(decided().may_exclude_odometry);
+        TEST_ASSERT_TRUE(decided().weight <= 1);
         TEST_ASSERT_TRUE(k < 5 || is_said(CONTRADICTED));
     }
     TEST_ASSERT_TRUE(is_said(PLR_REASON_NOISE_MISFIT));
@@ -196,7 +202,7 @@ static void test_an_event_that_begins_slowly_has_a_before(void) {
 static void test_odometry_that_slips_loses_weight(void) {
     add_agreement(BEFORE);
     add_slip(6);
-    TEST_ASSERT_GREATER_THAN_DOUBLE(sqrt(1 + 40.0 / 2), (double)plr_supervise_weight(&s));
+    TEST_ASSERT_GREATER_THAN_DOUBLE(sqrt(1 + 40.0 / 2), (double)decided().weight);
 }
 
 /* What distant points say of the way is next to nothing in a frame and enough in twenty. */
@@ -208,7 +214,7 @@ static void test_a_difference_that_is_hardly_seen_is_said_and_takes_no_weight(vo
     for (unsigned k = 0; k < 100; k++) {
         add(nu, 0);
         told += is_said(CONTRADICTED | MAY_BE_WRONG);
-        TEST_ASSERT_TRUE(plr_supervise_weight(&s) <= 1);
+        TEST_ASSERT_TRUE(decided().weight <= 1);
     }
     TEST_ASSERT_GREATER_THAN_UINT(10, told);
     TEST_ASSERT_EQUAL_UINT(0, contradictions);
@@ -240,8 +246,7 @@ static void test_a_second_frame_confirms_and_one_that_rejects_nearly_all_does_no
     exclude_odometry(0.4);
     TEST_ASSERT_EQUAL_UINT(1, contradictions);
     TEST_ASSERT_TRUE(is_said(CONTRADICTED | MAY_BE_WRONG));
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, sqrt(1 + 0.5 * pow(0.4 / SIGMA_M, 2)),
-                              (double)plr_supervise_weight(&s));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, sqrt(1 + 0.5 * pow(0.4 / SIGMA_M, 2)), (double)decided().weight);
 }
 
 /* ---------------------------------------------------------------- what is covered */
@@ -278,7 +283,7 @@ static void test_fifteen_frames_of_agreement_settle_it_and_what_lies_between_is_
     TEST_ASSERT_DOUBLE_WITHIN(0.06 * 0.16, 1.04 * 0.16, (double)decision.cover[0]);
     TEST_ASSERT_EQUAL_HEX32(0, decision.reasons);
     TEST_ASSERT_EQUAL_DOUBLE(0, cover(0));
-    TEST_ASSERT_EQUAL_DOUBLE(1, (double)plr_supervise_weight(&s));
+    TEST_ASSERT_EQUAL_DOUBLE(1, (double)decided().weight);
 }
 
 static void test_a_frame_that_differs_begins_the_settling_anew(void) {
@@ -338,7 +343,7 @@ static void test_biases_are_taught_nothing_until_it_is_settled_or_has_lasted_for
     for (unsigned k = 1; k <= SETTLED; k++)
         TEST_ASSERT_TRUE(add(nu, 0));
     TEST_ASSERT_FALSE(add(nu, 0));
-    plr_supervise_begun_anew(&s, true); /* a doubt that does not end */
+    (void)plr_supervise_begun_anew(&s, true); /* a doubt that does not end */
     for (unsigned k = 0; k < 800; k++) {
         e.events.lost_in_map = true;
         s.frozen = 1;
@@ -365,9 +370,8 @@ static void test_a_pose_that_is_set_is_in_no_doubt_and_one_found_anew_is(void) {
     plr_supervise_pose_set(&s);
     TEST_ASSERT_EQUAL_UINT8(PLR_DOUBT_NONE, s.doubt);
     TEST_ASSERT_EQUAL_DOUBLE(0, cover(0));
-    TEST_ASSERT_TRUE(
-        plr_supervise_may_exclude_odometry(&s)); /* what was learnt of the odometry holds */
-    plr_supervise_begun_anew(&s, true);
+    TEST_ASSERT_TRUE(decided().may_exclude_odometry); /* what was learnt of the odometry holds */
+    (void)plr_supervise_begun_anew(&s, true);
     TEST_ASSERT_TRUE(plr_supervise_was_relocated(&s));
     add_agreement(SETTLED - 1);
     TEST_ASSERT_TRUE(is_said(MAY_BE_WRONG));

@@ -19,11 +19,11 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from pelorus.console import err, out, progress
 from pelorus.errors import PelorusError
-from pelorus.frames import Kind, Message, Stereo
+from pelorus.program.console import err, out, progress
 from pelorus.robot.emulator import MACHINES, Emulator
-from pelorus.wire import Writer, read_file
+from pelorus.wire.frames import Kind, Message, Stereo
+from pelorus.wire.framing import Writer, read_file
 from scipy.optimize import nnls
 
 from firmware.stack import image_bound

@@ -22,7 +22,6 @@ __all__ = [
 
 if TYPE_CHECKING:
     from pelorus.errors import PelorusError
-    from pelorus.eyes import Tracker
     from pelorus.filter import (
         NOT_SEEN_PX,
         Calibration,
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
         Reason,
         observations,
     )
+    from pelorus.tracker import Tracker
 
 
 def __getattr__(name: str) -> Any:
@@ -39,7 +39,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'pelorus' has no attribute {name!r}")
     if name == "Tracker":
-        from pelorus.eyes import Tracker  # noqa: PLC0415
+        from pelorus.tracker import Tracker  # noqa: PLC0415
 
         return Tracker
     from pelorus import filter as found  # noqa: PLC0415

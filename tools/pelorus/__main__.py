@@ -3,6 +3,6 @@
 
 import sys
 
-from pelorus.cli import main
+from pelorus.commands.cli import main
 
 sys.exit(main())

@@ -25,14 +25,15 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pelorus import native, schema
-from pelorus.arguments import address, are_whole, checked, kind_of, real, whole_number
-from pelorus.configured import Configured, Named, of_recording
 from pelorus.errors import PelorusError
-from pelorus.frames import Message
-from pelorus.layout import unpack_symmetric
-from pelorus.native import Health, Precision, ReadingResult, Report, Supervision
-from pelorus.reason import Reason
+from pelorus.native import binding
+from pelorus.native.arguments import address, are_whole, checked, kind_of, real, whole_number
+from pelorus.native.binding import Health, Precision, ReadingResult, Report, Supervision
+from pelorus.native.configured import Configured, Named, of_recording
+from pelorus.wire import schema
+from pelorus.wire.frames import Message
+from pelorus.wire.layout import unpack_symmetric
+from pelorus.wire.reason import Reason
 
 __all__ = [
     "NOT_SEEN_PX",
@@ -106,7 +107,7 @@ class Calibration:
     @classmethod
     def from_file(cls, path: str | Path) -> Self:
         """Reads a calibration.json, as for `pelorus convert`."""
-        from pelorus import calibration  # noqa: PLC0415 - reads files, which most callers do not
+        from pelorus.rig import calibration  # noqa: PLC0415 - reads files, which most callers do not
 
         return cls.of_header(calibration.read(Path(path)))
 
@@ -141,8 +142,8 @@ def observations(
     return frame
 
 
-def _pose(name: str, R: ArrayLike, p: ArrayLike) -> native.Pose:
-    pose = native.Pose()
+def _pose(name: str, R: ArrayLike, p: ArrayLike) -> binding.Pose:
+    pose = binding.Pose()
     pose.R[:] = checked(f"{name}: R", R, (3, 3)).ravel()
     pose.p[:] = checked(f"{name}: p", p, (3,))
     return pose
@@ -167,7 +168,7 @@ class Filter:
         precision: Precision = "float32",
         known: Mapping[int, KnownLandmark] | None = None,
     ) -> None:
-        self._c = native.library(precision)
+        self._c = binding.library(precision)
         self.precision: Precision = precision
         self.known = dict(known or {})
         self.evicted: dict[int, KnownLandmark] = {}
@@ -178,18 +179,18 @@ class Filter:
         for name, value in (config or {}).items():
             self._config.set(name, value)
         self._config.check()
-        self._callbacks = native.Map(None, native.Sink(self._take), native.Source(self._find))
-        given = native.Calibration(
+        self._callbacks = binding.Map(None, binding.Sink(self._take), binding.Source(self._find))
+        given = binding.Calibration(
             *(
                 real(f"calibration: {name}", getattr(calibration, name))
-                for name, _ in native.Calibration._fields_[:5]
+                for name, _ in binding.Calibration._fields_[:5]
             ),
             _pose("calibration", calibration.R_CB, calibration.t_CB_m),
         )
         pointers = (c.byref(part) for part in (given, self._config.memory, self._callbacks, sizes))
         self._checked("init", self._c.filter_init_sized(self._f, *pointers))
         # Made once: a frame creates no object but its report.
-        self._twist, self._frame, self._report = native.Twist(), native.Frame(), native.Report()
+        self._twist, self._frame, self._report = binding.Twist(), binding.Frame(), binding.Report()
         self._twist_at, self._frame_at = c.addressof(self._twist), c.addressof(self._frame)
         self._linear = np.ctypeslib.as_array(self._twist.linear)
         self._angular = np.ctypeslib.as_array(self._twist.angular)
@@ -346,7 +347,7 @@ class Filter:
         if sensor not in kinds:
             raise PelorusError(f"sensor {sensor!r}: one of {', '.join(kinds)}")
         sigmas = checked("sigma", sigma, (3,))
-        reading = native.Reading(whole_number("t_ns", t_ns, MOST_NS), kinds[sensor])
+        reading = binding.Reading(whole_number("t_ns", t_ns, MOST_NS), kinds[sensor])
         still = sensor == "standstill"
         reading.axes = sum(1 << i for i in range(2 if still else 3) if sigmas[i] != 0)
         reading.value[:], reading.sigma[:] = checked("value", value, (3,)), sigmas
@@ -430,9 +431,11 @@ class Filter:
 
     def totals(self) -> dict[str, int]:
         """Returns counts since the beginning, by name."""
-        counts = native.Totals()
+        counts = binding.Totals()
         self._checked("totals", self._c.filter_totals(self._f, c.byref(counts)))
-        return {name: int(getattr(counts, name)) for name in (*native.COUNTS_32, *native.COUNTS_64)}
+        return {
+            name: int(getattr(counts, name)) for name in (*binding.COUNTS_32, *binding.COUNTS_64)
+        }
 
     # --- saved state
 
@@ -444,7 +447,7 @@ class Filter:
             saved.extend(c.string_at(data, n))
             return 0
 
-        self._checked("save", self._c.filter_save(self._f, native.StateSink(take), None))
+        self._checked("save", self._c.filter_save(self._f, binding.StateSink(take), None))
         return bytes(saved)
 
     def restore(self, saved: bytes) -> None:
@@ -458,7 +461,7 @@ class Filter:
             c.memmove(data, saved[offset : offset + n], n)
             return 0
 
-        source = native.StateSource(give)
+        source = binding.StateSource(give)
         self._checked("restore", self._c.filter_restore(self._f, len(saved), source, None))
 
     def resume(self, t_ns: int, moved: ArrayLike | None = None) -> None:
@@ -487,8 +490,8 @@ class Filter:
         return int(self._c.sizes.observations)
 
 
-def _landmark(id: int, known: KnownLandmark) -> native.Landmark:
-    landmark = native.Landmark(id=id, known=True)
+def _landmark(id: int, known: KnownLandmark) -> binding.Landmark:
+    landmark = binding.Landmark(id=id, known=True)
     landmark.p_W_m[:] = checked(f"landmark {id}: p_W_m", known.p_W_m, (3,))
     landmark.P_W_m2[:] = checked(f"landmark {id}: P_W_m2", known.P_W_m2, (3, 3)).ravel()
     return landmark

@@ -242,13 +242,20 @@ static void print_bounds(void) {
     }
 }
 
+static void print_limit(const plr_limit_row *l) {
+    printf("| %s | %g | %s | %s | %s | %s |\n", l->name, l->value, l->unit, l->about, l->scenario,
+           l->recording);
+}
+
+/* Each rule, and the numbers that belong to it. */
 static void print_limits(void) {
     printf("| threshold | | unit | what, and why | needed on | and on the recording |\n"
            "|---|---|---|---|---|---|\n");
-    for (unsigned i = 0; plr_limit_at(i); i++) {
-        const plr_limit_row *l = plr_limit_at(i);
-        printf("| %s | %g | %s | %s | %s | %s |\n", l->name, l->value, l->unit, l->about,
-               l->scenario, l->recording);
+    for (unsigned i = 0; i < PLR_RULES; i++) {
+        print_limit(plr_limit_at(i));
+        for (unsigned k = PLR_RULES; k < PLR_LIMITS; k++)
+            if (strcmp(plr_limit_at(k)->rule, plr_limit_at(i)->name) == 0)
+                print_limit(plr_limit_at(k));
     }
 }
 

@@ -31,3 +31,8 @@ set(board_mps3_an547_largest 64)
 set(board_stm32f405_cpu m4f)
 set(board_stm32f405_drivers stm32_usart.c stm32_flash.c)
 set(board_stm32f405_largest 48)
+
+#   board_<name>_eyes: pixels of a picture, tracks, and landmarks of its images with eyes, if there are some; they take
+#   memory_eyes.ld where the board has one
+set(board_stm32f405_eyes 19200 32 32)
+set(board_mps2_an500_eyes 76800 50 64)

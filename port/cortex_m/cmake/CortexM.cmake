@@ -8,9 +8,10 @@ pelorus_sources(PELORUS_SOURCES)
 # rest of the library is compiled to be small, -Os, and so is what few frames need of these (PLR_SELDOM): 57 KB less,
 # for 2 % more instructions a frame and 4 % more a reading at N = 32. No level changes a bit.
 set(spent_in ${PELORUS_SOURCES})
-list(FILTER spent_in INCLUDE REGEX "/src/(math/(blocks3|dense|packed|se3|so3)|process/(imu|twist)|sensor/stereo|\
+list(FILTER spent_in INCLUDE REGEX "/src/(math/(blocks3|checksum|dense|packed|se3|so3)|process/(imu[a-z_]*|twist|statistics)|sensor/stereo|\
 state/(covariance[a-z_]*|model_body|polar|rigid_fit)|\
-filter/(correction|guard|motion_first|search))\\.c$")
+filter/(correction|guard|motion_first|search)|\
+vision/(corners|lens|patch|pyramid|rig|track|vision|watch))\\.c$")
 set_source_files_properties(${spent_in} PROPERTIES COMPILE_OPTIONS -O3)
 
 set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
@@ -121,24 +122,67 @@ function(cortexm_port board)
   endif()
 endfunction()
 
+# The library with room for a board's pictures. Tracks are all that a frame shows.
+function(cortexm_eyes_library result board)
+  set(name pelorus-eyes-${board})
+  list(GET board_${board}_eyes 0 pixels)
+  list(GET board_${board}_eyes 1 tracks)
+  list(GET board_${board}_eyes 2 landmarks)
+  if(NOT TARGET ${name})
+    add_library(${name} STATIC ${PELORUS_SOURCES})
+    cortexm_options(${name} ${board_${board}_cpu})
+    target_compile_options(${name} PRIVATE -Os)
+    target_include_directories(${name} PUBLIC "${PELORUS_ROOT}/include" PRIVATE "${PELORUS_ROOT}/src")
+    target_compile_definitions(${name} PUBLIC PLR_REAL=32 PLR_MAX_LANDMARKS=${landmarks}
+      PLR_MAX_OBSERVATIONS=${tracks} PLR_BLOCK_OBSERVATIONS=8 PLR_PORTABLE=0 PLR_TILE_COLUMNS=6
+      PLR_VISION=1 PLR_VISION_PIXELS=${pixels} PLR_VISION_TRACKS=${tracks})
+  endif()
+  set(${result} ${name} PARENT_SCOPE)
+endfunction()
+
 # An image `name` for a board, out of sources and a library of that precision, in all three forms.
 function(cortexm_image name board library bits)
   set(cpu ${board_${board}_cpu})
   set(folder "${PORT}/boards/${board}")
+  set(script memory.ld)
+  if(name MATCHES "eyes" AND EXISTS "${folder}/memory_eyes.ld")
+    set(script memory_eyes.ld)
+  endif()
   cortexm_port(${board})
   add_executable(${name} ${ARGN} "${PORT}/panic.c" $<TARGET_OBJECTS:port-${board}>)
   cortexm_options(${name} ${cpu})
   set_target_properties(${name} PROPERTIES
     SUFFIX .elf RUNTIME_OUTPUT_DIRECTORY "${IMAGES}"
-    LINK_DEPENDS "${folder}/memory.ld;${PORT}/boards/sections.ld")
+    LINK_DEPENDS "${folder}/${script};${PORT}/boards/sections.ld")
   target_link_libraries(${name} PRIVATE ${library})
   target_link_options(${name} PRIVATE ${cpu_${cpu}} -nostartfiles --specs=nano.specs
     "-Wl,--defsym=STACK_SIZE=${stack_bytes_${bits}}"
-    -T "${folder}/memory.ld" "-L${PORT}/boards" -Wl,--gc-sections -Wl,--fatal-warnings
+    -T "${folder}/${script}" "-L${PORT}/boards" -Wl,--gc-sections -Wl,--fatal-warnings
     "-Wl,-Map=${IMAGES}/${name}.map" ${FORBIDDEN})
   add_custom_command(TARGET ${name} POST_BUILD
     COMMAND "${CMAKE_OBJCOPY}" -O binary "${IMAGES}/${name}.elf" "${IMAGES}/${name}.bin"
     COMMAND "${CMAKE_OBJCOPY}" -O ihex "${IMAGES}/${name}.elf" "${IMAGES}/${name}.hex")
+endfunction()
+
+# eyes-<board>, the firmware with eyes, and eyes-replay-<board>, which carries a recording with pictures and is linked for
+# QEMU: PELORUS_CCM_ORIGIN says where that has a second memory.
+function(cortexm_eyes board)
+  cortexm_eyes_library(library ${board})
+  cortexm_image(eyes-${board} ${board} ${library} 32
+    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" "${PORT}/eyes_static.c" "${PORT}/telemetry_none.c")
+  add_dependencies(eyes eyes-${board})
+  set(recording "${PELORUS_EYES_RECORDINGS}/${board}.plr")
+  if(NOT PELORUS_EYES_RECORDINGS OR NOT EXISTS "${recording}")
+    return()
+  endif()
+  cortexm_image(eyes-replay-${board} ${board} ${library} 32
+    "${PORT}/main_eyes.c" "${PORT}/eyes_static.c" "${PORT}/bench_recording.S")
+  target_compile_definitions(eyes-replay-${board} PRIVATE "BENCH_RECORDING=\"${recording}\"")
+  set_property(SOURCE "${PORT}/bench_recording.S" APPEND PROPERTY OBJECT_DEPENDS "${recording}")
+  if(PELORUS_CCM_ORIGIN)
+    target_link_options(eyes-replay-${board} PRIVATE "-Wl,--defsym=CCM_ORIGIN=${PELORUS_CCM_ORIGIN}")
+  endif()
+  add_dependencies(eyes eyes-replay-${board})
 endfunction()
 
 function(cortexm_bringup board)
@@ -167,7 +211,7 @@ function(cortexm_firmware board capacity bits)
     string(APPEND suffix -f64)
   endif()
   cortexm_image(pelorus-${suffix} ${board} ${library} ${bits}
-    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" ${telemetry_sources})
+    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" "${PORT}/eyes_none.c" ${telemetry_sources})
   if(PELORUS_MAVLINK)
     add_dependencies(pelorus-${suffix} pelorus_mavlink_headers)
   endif()

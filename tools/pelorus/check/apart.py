@@ -29,17 +29,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3, wire
 from pelorus.check.contents import AHEAD, recording_of, write
 from pelorus.check.options import Settings, options_of
-from pelorus.console import progress
-from pelorus.evaluation import world_laid
-from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo, Twist
-from pelorus.layout import Floats
-from pelorus.replay import NothingUsefulError, stuffed_answers, threads
-from pelorus.settings import CALIBRATION_SIGMAS
-from pelorus.tracks import Tracks
-from pelorus.trajectory import Trajectory, estimate_in
+from pelorus.evaluate.evaluation import world_laid
+from pelorus.io.tracks import Tracks
+from pelorus.io.trajectory import Trajectory, estimate_in
+from pelorus.math import se3
+from pelorus.native.replay import NothingUsefulError, stuffed_answers, threads
+from pelorus.program.console import progress
+from pelorus.wire import framing
+from pelorus.wire.frames import Imu, Kind, Message, Reading, Start, Stereo, Twist
+from pelorus.wire.layout import Floats
+from pelorus.wire.settings import CALIBRATION_SIGMAS
 
 WINDOW_FRAMES, WINDOWS_MOST = 60, 12
 SETTLED = 3  # frames at the beginning of a window that are not compared
@@ -161,7 +162,7 @@ class Parts:
             answers = stuffed_answers(self._program, part.path, options)
         except NothingUsefulError:  # not one frame of so short a part could be used
             return None
-        return estimate_in(list(wire.only(answers, Kind.POSE)))
+        return estimate_in(list(framing.only(answers, Kind.POSE)))
 
 
 def _typical(values: Sequence[float]) -> float:

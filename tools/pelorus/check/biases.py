@@ -15,8 +15,8 @@ from pelorus.check.clock import seconds
 from pelorus.check.options import Settings
 from pelorus.check.outcome import PART, Bench
 from pelorus.check.parameters import FRAMES_FEW, PAYS, TWIST, written
-from pelorus.layout import Floats
-from pelorus.schema import DEFAULTS
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import DEFAULTS
 
 WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
 PRIORS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}

@@ -10,7 +10,7 @@ from math import hypot
 from pelorus.check.mount import Turned, turned
 from pelorus.check.scale import Doubt, bias_of, doubted
 from pelorus.faults.agreement import NO_BIAS_MPS, Agreement
-from pelorus.frames import Message
+from pelorus.wire.frames import Message
 
 
 @dataclass(frozen=True)

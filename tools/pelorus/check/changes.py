@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pelorus.check.mount import CAMERA_TURN
 from pelorus.check.parameters import Tuned, of_process, starting
 from pelorus.check.tracks_noise import DRIFT
-from pelorus.frames import Header
+from pelorus.wire.frames import Header
 
 OTHER_SIGMA = 1.2  # ratio of sigmas from which a change is reported
 

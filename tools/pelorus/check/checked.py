@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pelorus import wire
 from pelorus.check import changes, wheels
 from pelorus.check.calibration import calibration
 from pelorus.check.estimated import without_clock
@@ -19,12 +18,13 @@ from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
 from pelorus.check.verdict import Grade, JudgedRun, Remark, Verdict, of_search, verdict_of
-from pelorus.console import progress, step
 from pelorus.errors import PelorusError
-from pelorus.evaluation import judge
+from pelorus.evaluate.evaluation import judge
 from pelorus.faults.named import judged_of
-from pelorus.replay import Outputs, replay
-from pelorus.trajectory import Trajectory, truth_in
+from pelorus.io.trajectory import Trajectory, truth_in
+from pelorus.native.replay import Outputs, replay
+from pelorus.program.console import progress, step
+from pelorus.wire import framing
 
 SPELLS_SHOWN = 12
 STEPS = 5
@@ -83,7 +83,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     """Tunes in the folder, then replays the whole recording with old and new settings."""
     step("faults of the recording")
     bench = Bench(program, recording, folder, given.get("process", ""))
-    messages = wire.messages_of(recording)
+    messages = framing.messages_of(recording)
     known = Known(judged_of(messages, bench.examined), None, bench.examined)
     if known.is_stopped:
         return Checked(verdict_of(None, known), None, [], [], [], [], None)
@@ -146,7 +146,7 @@ def _whole(
         if NOTHING_USED in str(error):
             return None
         raise
-    return JudgedRun.of(wire.messages_of(outputs.log))
+    return JudgedRun.of(framing.messages_of(outputs.log))
 
 
 def _figures(run: JudgedRun, truth: Trajectory | None) -> dict[str, str]:

@@ -16,8 +16,8 @@ import numpy as np
 
 from pelorus.check.options import Settings
 from pelorus.check.outcome import OFFSET, OFFSET_MOST_S, Bench, Outcome
-from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.math.motion import Times
+from pelorus.wire.layout import Floats
 
 FEWEST = 5  # points of a parabola
 PARTS = 20  # of the drive, for the jackknife

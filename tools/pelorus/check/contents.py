@@ -10,14 +10,14 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from pelorus import inertial
 from pelorus.errors import PelorusError
-from pelorus.frames import Imu, Kind, Message, Process, Reading, Start, Stereo, Twist
-from pelorus.inertial import Inertial
-from pelorus.inertial_survey import readings_of
-from pelorus.recording import Recording
-from pelorus.tracks import Tracks
-from pelorus.wire import Writer, header_of_messages
+from pelorus.evaluate.inertial_survey import readings_of
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math import inertial
+from pelorus.math.inertial import Inertial
+from pelorus.wire.frames import Imu, Kind, Message, Process, Reading, Start, Stereo, Twist
+from pelorus.wire.framing import Writer, header_of_messages
 
 
 def recording_of(messages: Sequence[Message], process: Process | None = None) -> Recording:

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.calibrated import PARTS, Calibrated, CalibrationPart, last_calibrated
 from pelorus.check.calibration import CalibrationDoubts
 from pelorus.check.mount import SURE, Turned
 from pelorus.check.options import Settings
-from pelorus.frames import Message
-from pelorus.layout import Floats
-from pelorus.schema import SETTINGS
-from pelorus.settings import IDS, in_force
+from pelorus.wire.calibrated import PARTS, Calibrated, CalibrationPart, last_calibrated
+from pelorus.wire.frames import Message
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import SETTINGS
+from pelorus.wire.settings import IDS, in_force
 
 TOLD = 3.0  # sigmas from which a correction is reported
 OFF_PRIOR = 4.0  # sigmas of the prior, as the filter's own reason CALIBRATION_OFF

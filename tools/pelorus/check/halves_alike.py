@@ -25,7 +25,7 @@ from pelorus.check.apart import Inflated, Parts
 from pelorus.check.options import Settings
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned, larger, unless_surer
-from pelorus.frames import Kind
+from pelorus.wire.frames import Kind
 
 
 def with_halves_alike(bench: Bench, tuned: Tuned) -> Tuned:

@@ -14,9 +14,9 @@ from pelorus.faults.fault import Fault
 from pelorus.faults.geometry import Judged
 from pelorus.faults.handeye import first_part
 from pelorus.faults.named import judged_of
-from pelorus.frames import Message, Process
-from pelorus.recording import Recording
-from pelorus.settings import in_force
+from pelorus.io.recording import Recording
+from pelorus.wire.frames import Message, Process
+from pelorus.wire.settings import in_force
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pelorus.consistency import mean, nees_per_dof
-from pelorus.frames import Message
-from pelorus.layout import Floats
-from pelorus.schema import DEFAULTS
-from pelorus.se3 import Poses
-from pelorus.trajectory import estimate_in
+from pelorus.io.trajectory import estimate_in
+from pelorus.math.consistency import mean, nees_per_dof
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Message
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import DEFAULTS
 
 LARGEST = 0.1  # largest baseline-sigma that the filter takes
 ADDS = 0.5  # NEES per degree of freedom: a smaller increase does not matter

@@ -14,10 +14,10 @@ import numpy as np
 
 from pelorus.check.lasting import ADDS, added_nees, stands
 from pelorus.faults.agreement import Agreement
-from pelorus.frames import Message
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
-from pelorus.settings import in_force
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Message
+from pelorus.wire.layout import Floats
+from pelorus.wire.settings import in_force
 
 SURE = 4.5  # sigmas; of 140 drives with a right T_CB the largest are 4.4 and 4.1, with 1 degree 8
 CAMERA_TURN, TURN_MOST = "camera-turn-sigma", 0.2  # rad, largest that the setting takes

@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import wire
 from pelorus.check.apart import Parts
 from pelorus.check.contents import (
     first_frames,
@@ -31,12 +30,13 @@ from pelorus.check.contents import (
     write,
 )
 from pelorus.check.options import Settings, options_of
-from pelorus.console import progress
-from pelorus.frames import Header, Kind, Message, Pose, Process, Report, Stereo
-from pelorus.layout import Floats, unpack_symmetric
-from pelorus.replay import stuffed_answers, threads
-from pelorus.schema import number
-from pelorus.trajectory import POSE_SIZE
+from pelorus.io.trajectory import POSE_SIZE
+from pelorus.native.replay import stuffed_answers, threads
+from pelorus.program.console import progress
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Kind, Message, Pose, Process, Report, Stereo
+from pelorus.wire.layout import Floats, unpack_symmetric
+from pelorus.wire.schema import number
 
 # While settings are compared the gate stands where an observation is as likely an outlier as an
 # inlier. The usual gate cuts 1 % of the inliers, and so would favour sigmas that are too large.
@@ -91,8 +91,8 @@ class Bench:
     """
 
     def __init__(self, program: Path, recording: Path, folder: Path, process: str = "") -> None:
-        messages = wire.messages_of(recording)
-        self.header = wire.header_of_messages(messages)
+        messages = framing.messages_of(recording)
+        self.header = framing.header_of_messages(messages)
         asked = Process[process.upper()] if process else None
         self.examined = recording_of(messages, asked)
         part = within(first_frames(messages), round(OFFSET_MOST_S * 1e9))
@@ -148,9 +148,9 @@ class Bench:
         wanted = {k: v for k, v in settings.items() if not k.startswith("@")}
         options = options_of(wanted | {"gate-d2": GATE_D2})
         frames = stuffed_answers(self._program, recording, options)
-        poses = wire.only(reversed(frames), Kind.POSE)
+        poses = framing.only(reversed(frames), Kind.POSE)
         last = (m for m in poses if isinstance(m, Pose) and m.after_stereo)
-        told = chain(wire.only(frames, Kind.REPORT), islice(last, 1))
+        told = chain(framing.only(frames, Kind.REPORT), islice(last, 1))
         return outcome_of(told, self._outlier_cost)
 
 

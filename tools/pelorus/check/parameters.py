@@ -13,8 +13,8 @@ from pelorus.check.apart import Inflated
 from pelorus.check.options import Settings
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.tracks_noise import DRIFT, TrackNoise
-from pelorus.frames import Header
-from pelorus.schema import DEFAULTS
+from pelorus.wire.frames import Header
+from pelorus.wire.schema import DEFAULTS
 
 AXES = "xyz"
 PAYS = 20.0  # -2 ln of the likelihood ratio that a further parameter, or another timing, must gain

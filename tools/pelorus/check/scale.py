@@ -20,10 +20,10 @@ from pelorus.check.options import Settings
 from pelorus.check.outcome import SCALE, Bench
 from pelorus.check.parameters import PAYS
 from pelorus.faults.agreement import Agreement
-from pelorus.frames import Message
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
-from pelorus.settings import in_force
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Message
+from pelorus.wire.layout import Floats
+from pelorus.wire.settings import in_force
 
 STEP, STEPS = 0.01, 4
 SURE = 4.0  # sigmas from which a scale is off

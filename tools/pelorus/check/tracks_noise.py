@@ -15,14 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus import visual_motion
 from pelorus.check.options import Settings
-from pelorus.console import progress
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.recording import Recording
-from pelorus.row_gaps import TOLD_ABOVE_PX, RowGaps, row_gaps
-from pelorus.visual_motion import seen_pairs
+from pelorus.io.recording import Recording
+from pelorus.math.motion import Times
+from pelorus.program.console import progress
+from pelorus.tracking import visual_motion
+from pelorus.tracking.row_gaps import TOLD_ABOVE_PX, RowGaps, row_gaps
+from pelorus.tracking.visual_motion import seen_pairs
+from pelorus.wire.layout import Floats
 
 DRIFT = "track-drift"
 LASTS = 0.7  # r: the errors of real trackers stop growing

@@ -32,7 +32,7 @@ from pelorus.check.parameters import (
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
 from pelorus.check.tracks_noise import TrackNoise, differs_clearly, track_noise
-from pelorus.inertial_survey import scatter
+from pelorus.evaluate.inertial_survey import scatter
 
 LOOSE = 10.0  # factor of the noises while the clock is far off
 MIDDLE = (2.0, 2.0, 1.5)  # the whole drive with few landmarks, once the clock is about right

@@ -15,7 +15,6 @@ from enum import IntEnum
 
 import numpy as np
 
-from pelorus.arrivals import late_ones
 from pelorus.check.calibration import CalibrationDoubts, calibration
 from pelorus.check.estimated import Estimated, estimated
 from pelorus.check.known import Known, known_of
@@ -23,15 +22,16 @@ from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned
 from pelorus.check.scale import Doubt
 from pelorus.check.tracks_noise import DRIFT, differs_clearly
-from pelorus.evaluation import judge
+from pelorus.evaluate.evaluation import judge
+from pelorus.evaluate.frame_table import BIASES, FrameTable, frame_table
+from pelorus.evaluate.health import GOOD as OF_GOOD
+from pelorus.evaluate.health import HARMLESS, LOST, NOT_STARTED, TimeLine, time_line
 from pelorus.faults.mend import BEHIND, CANNOT, known_words
-from pelorus.frame_table import BIASES, FrameTable, frame_table
-from pelorus.frames import Kind, Message, Report
-from pelorus.health import GOOD as OF_GOOD
-from pelorus.health import HARMLESS, LOST, NOT_STARTED, TimeLine, time_line
-from pelorus.schema import HEALTHS, number
-from pelorus.settings import IDS, SETTINGS, in_force
-from pelorus.trajectory import truth_in
+from pelorus.io.arrivals import late_ones
+from pelorus.io.trajectory import truth_in
+from pelorus.wire.frames import Kind, Message, Report
+from pelorus.wire.schema import HEALTHS, number
+from pelorus.wire.settings import IDS, SETTINGS, in_force
 
 GOOD = HEALTHS[0]
 LATE = number("status", "LATE")

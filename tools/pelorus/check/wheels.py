@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from pelorus.check.options import Settings, options_of
 from pelorus.check.verdict import Grade, Remark
 from pelorus.converters.wheels import WHEEL
-from pelorus.frames import Message, Pose, Reading
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.replay import replayed
+from pelorus.math.motion import Times
+from pelorus.native.replay import replayed
+from pelorus.wire.frames import Message, Pose, Reading
+from pelorus.wire.layout import Floats
 
 STRETCHES = 10  # of the drive, left out in turn
 LEAST = 200  # moving readings that a fit needs

@@ -12,9 +12,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, settings_given
-from pelorus.console import VERDICT_COLOURS, out, print_json, steps
+from pelorus.commands.verdicts import VERDICT_COLOURS
 from pelorus.errors import write_text
-from pelorus.replay import find_programs
+from pelorus.native.replay import find_programs
+from pelorus.program.console import out, print_json, steps
 
 if TYPE_CHECKING:
     from pelorus.check.checked import Checked
@@ -82,21 +83,21 @@ def _write(
     calibration: list[Path],
 ) -> None:
     """Writes the page, with curves of a run with the found settings, if there are any."""
-    from pelorus import wire  # noqa: PLC0415
     from pelorus.check.options import options_of  # noqa: PLC0415
     from pelorus.explain import explain  # noqa: PLC0415
-    from pelorus.replay import Outputs, replay  # noqa: PLC0415
+    from pelorus.native.replay import Outputs, replay  # noqa: PLC0415
     from pelorus.report import answers  # noqa: PLC0415
     from pelorus.report.curves import Curves  # noqa: PLC0415
     from pelorus.report.footage import footage  # noqa: PLC0415
     from pelorus.report.page import write  # noqa: PLC0415
+    from pelorus.wire import framing  # noqa: PLC0415
 
     if found.tuned is None:
         write(page, answers.of_check(found, recording.name, None))
         return
     outputs = Outputs.named(folder, "page")
     replay(program, recording, options_of(found.tuned.settings), outputs)
-    messages = wire.messages_of(outputs.log)
+    messages = framing.messages_of(outputs.log)
     explained = explain(messages)
     answer = answers.of_check(found, recording.name, explained)
     answer = answers.with_setup(answer, messages)

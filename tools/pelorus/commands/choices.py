@@ -8,10 +8,10 @@ from pathlib import Path
 
 import typer
 
-from pelorus import schema
 from pelorus.errors import PelorusError, read_text
-from pelorus.frames import TwistTiming
-from pelorus.settings import IDS
+from pelorus.wire import schema
+from pelorus.wire.frames import TwistTiming
+from pelorus.wire.settings import IDS
 
 LOG: Path = typer.Argument(
     ...,

@@ -10,16 +10,16 @@ import typer
 from rich.markup import escape
 
 from pelorus.commands.choices import PROGRAMS
-from pelorus.console import err, out, print_json
 from pelorus.errors import PelorusError
 from pelorus.flight import flight_json
 from pelorus.flight.difference import Difference, PoseDistance
 from pelorus.flight.judge import BitsVerdict, Desk, Judgement, judge, of_this_version, verdict_of
 from pelorus.flight.log import NOWHERE, Frame, read_log
-from pelorus.frames import Config
-from pelorus.replay import find_programs
+from pelorus.native.replay import find_programs
+from pelorus.program.console import err, out, print_json
 from pelorus.robot.status import condition
-from pelorus.schema import STATUSES
+from pelorus.wire.frames import Config
+from pelorus.wire.schema import STATUSES
 
 LOSSES_SHOWN = 5
 START_HINT = "if the pelorus-replay that wrote the log was given --start, give it here too"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from pelorus.console import out
 from pelorus.faults.finding import Finding
-from pelorus.frames import TEXT_BYTES_MAX, Text
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.program.console import out
+from pelorus.wire.frames import TEXT_BYTES_MAX, Text
 
 
 def _verdict(finding: Finding) -> str:
@@ -34,7 +34,11 @@ def write(recording: Recording, findings: list[Finding], target: Path) -> None:
     tracks = recording.tracks
     out.print(
         f"{escape(str(target))}: {size} bytes, {recording.motion_words}, "
-        f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
-        f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
+        + (
+            f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
+            if recording.pictures is None
+            else f"{len(recording.pictures.t_ns)} pairs of pictures, "
+        )
+        + f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
         + (f", {len(recording.readings)} readings" if recording.readings else "")
     )

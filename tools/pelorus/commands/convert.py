@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +13,17 @@ import typer
 from rich.markup import escape
 
 from pelorus.commands import importers, own
-from pelorus.commands.choices import Fix, Timing, TimingOrAuto
+from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
 from pelorus.commands.importers import OWN_DATA
-from pelorus.console import out
 from pelorus.converters import csv as csv_converter
-from pelorus.converters import ece276a as ece276a_converter
 from pelorus.converters import imu_npz as imu_npz_converter
-from pelorus.converters import landmark_map, late_turns, matlab, readings_csv
+from pelorus.converters import landmark_map, late_turns, readings_csv
 from pelorus.converters.columns import Columns
 from pelorus.converters.streams import TwistIn
-from pelorus.faults.mend import held_to_fit
+from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.program.console import out
 from pelorus.rig.lens import LensModel
-from pelorus.small_sensors import SMALL_SENSORS
 
 SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
 DATA_SETS = "Files of known data sets"
@@ -36,68 +35,6 @@ app = typer.Typer(
     no_args_is_help=True,
     epilog="Example:  pelorus convert euroc V1_01_easy V1_01.plr",
 )
-
-
-@app.command(
-    rich_help_panel=DATA_SETS,
-    epilog="Example:  pelorus convert ece276a 0027.npz 0027.plr --truth kitti-07.txt",
-)
-def ece276a(
-    source: Path = SOURCE,
-    target: Path = own.TARGET,
-    truth: Path | None = typer.Option(
-        None, metavar="POSES.txt", help="KITTI poses of the left camera; row k is frame k."
-    ),
-    fix: Fix = own.FIX,
-    twist_timing: TimingOrAuto = typer.Option(
-        TimingOrAuto.AUTO,
-        help="When a twist reading holds; auto: end if the data say so clearly, else start.",
-    ),
-    keep_ids: bool = typer.Option(
-        False,
-        "--keep-ids",
-        help="Leave stale tracks under the ids that the file gives them.",
-    ),
-) -> None:
-    """A .npz of UCSD's ECE276A project 3 (visual-inertial SLAM)."""
-    recording, findings = ece276a_converter.convert(
-        source, truth, fix is Fix.AUTO, twist_timing.value_in_header, keep_ids
-    )
-    write(recording, findings, target)
-
-
-@app.command(
-    "starry-night",
-    rich_help_panel=DATA_SETS,
-    epilog="Example:  pelorus convert starry-night dataset3.mat starry.plr",
-)
-def starry_night(
-    source: Path = SOURCE,
-    target: Path = own.TARGET,
-    twist_timing: Timing = typer.Option(Timing.START, help="When a twist reading holds."),
-    landmark_sigma: float = typer.Option(
-        matlab.LANDMARK_SIGMA_M,
-        metavar="M",
-        help="Standard deviation of the known landmarks, each axis.",
-    ),
-) -> None:
-    """A .mat of UTIAS's Starry Night, with its landmarks as known ones."""
-    recording = matlab.starry_night(source, twist_timing.value_in_header, landmark_sigma)
-    write(*held_to_fit(recording, recording, []), target)
-
-
-@app.command(
-    rich_help_panel=DATA_SETS,
-    epilog="Example:  pelorus convert klt 2011_09_26_drive_0001_sync_KLT.mat drive.plr",
-)
-def klt(
-    source: Path = SOURCE,
-    target: Path = own.TARGET,
-    twist_timing: Timing = typer.Option(Timing.MID, help="When a twist reading holds."),
-) -> None:
-    """A KITTI drive with KLT stereo tracks (.mat)."""
-    recording = matlab.klt(source, twist_timing.value_in_header)
-    write(*held_to_fit(recording, recording, []), target)
 
 
 def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
@@ -272,3 +209,7 @@ def late_turns_(
 
 importers.register(app)
 app.registered_commands.sort(key=lambda command: command.rich_help_panel != OWN_DATA)
+
+
+for added in entry_points(group="pelorus.formats"):  # of other packages
+    app.add_typer(added.load())

@@ -10,15 +10,11 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus import calibrated, evaluation, misread, road
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
-from pelorus.consistency import Figures
-from pelorus.console import err, out, print_json
 from pelorus.errors import PelorusError
-from pelorus.evaluation import assess, judge, known_in, match
-from pelorus.frames import Message
-from pelorus.replay import result_of
-from pelorus.trajectory import (
+from pelorus.evaluate import evaluation, misread, road
+from pelorus.evaluate.evaluation import assess, judge, known_in, match
+from pelorus.io.trajectory import (
     Trajectory,
     estimate_in,
     is_recording,
@@ -26,7 +22,12 @@ from pelorus.trajectory import (
     read_truth,
     truth_of,
 )
-from pelorus.wire import messages_of
+from pelorus.math.consistency import Figures
+from pelorus.native.replay import result_of
+from pelorus.program.console import err, out, print_json
+from pelorus.wire import calibrated
+from pelorus.wire.frames import Message
+from pelorus.wire.framing import messages_of
 
 POSES_MIN = 3  # three points fix a rigid fit
 MEANING = (

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from pelorus.commands.choices import CALIBRATION, LOG, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import out, print_json, tell_verdict, waiting
-from pelorus.replay import whole_log_of
+from pelorus.commands.verdicts import tell_verdict
+from pelorus.native.replay import whole_log_of
+from pelorus.program.console import out, print_json, waiting
 
 if TYPE_CHECKING:
     from pelorus.explain import Explanation
-    from pelorus.frames import Message
+    from pelorus.wire.frames import Message
 
 app = typer.Typer()
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import typer
 
-from pelorus import export as tables
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
-from pelorus.evaluation import made_in
-from pelorus.frame_table import frame_table, write_csv
-from pelorus.replay import result_of
+from pelorus.evaluate.evaluation import made_in
+from pelorus.evaluate.frame_table import frame_table, write_csv
+from pelorus.native.replay import result_of
+from pelorus.report import export as tables
 
 app = typer.Typer()
 

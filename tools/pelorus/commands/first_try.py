@@ -10,8 +10,8 @@ from pathlib import Path
 import typer
 
 from pelorus.commands.another import run_command
-from pelorus.console import step, steps
 from pelorus.errors import Existing, PelorusError, made, resolved
+from pelorus.program.console import step, steps
 
 STEPS_OF_CHECK, STEPS_OF_REPORT = 5, 3  # theirs load slowly
 RECORDINGS = (".plr", ".plr.zst")
@@ -43,7 +43,6 @@ FORMATS: tuple[tuple[str, str, Callable[[Path], bool]], ...] = (
     ("ros", "a bag's folder (metadata.yaml)", _has("metadata.yaml")),
     ("euroc", "a folder like EuRoC's (mav0)", _has("mav0", "cam0")),
     ("kitti", "a drive of KITTI (oxts, or calib.txt)", _has("oxts", "calib.txt")),
-    ("ece276a", "a .npz of ECE276A", _archive_with("features")),
     ("imu-npz", "a .npz with an IMU", _archive_with("stereo_px")),
 )
 

@@ -12,10 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import PROGRAMS, SETTINGS, settings_given
-from pelorus.console import VERDICT_COLOURS, err, out, print_json, tally, waiting
+from pelorus.commands.verdicts import VERDICT_COLOURS
 from pelorus.errors import Existing, PelorusError
 from pelorus.fleet import table
 from pelorus.fleet.journal import Journal
+from pelorus.program.console import err, out, print_json, tally, waiting
 
 if TYPE_CHECKING:
     from pelorus.fleet.examine import Work

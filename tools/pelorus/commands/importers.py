@@ -17,8 +17,7 @@ from rich.markup import escape
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
-from pelorus.console import out
-from pelorus.converters import bag, csv, euroc, kitti, ros, streams
+from pelorus.converters import bag, csv, euroc, kitti, ros, streams, with_pictures
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
@@ -26,8 +25,9 @@ from pelorus.converters.ros_motion import MotionTopics, Wheels
 from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
-from pelorus.frames import TwistTiming
+from pelorus.program.console import out
 from pelorus.rig.lens import LensModel
+from pelorus.wire.frames import TwistTiming
 
 OWN_DATA = "Your own data"
 RADIUS_MAX_M = 5.0
@@ -48,6 +48,7 @@ SHARED: dict[str, tuple[Any, Any]] = {
     "twist_in": (TwistIn, own.TWIST_IN),
     "twist_timing": (Timing | None, own.TIMING),
     "fix": (Fix, own.FIX),
+    "keep_pictures": (bool, own.KEEP_PICTURES),
 }
 
 
@@ -104,6 +105,7 @@ def _asked(
     twist_in: TwistIn,
     twist_timing: Timing | None,
     fix: Fix,
+    keep_pictures: bool,
 ) -> Asked:
     named = Columns.of(columns, crs, rows)
     timing = None if twist_timing is None else twist_timing.value_in_header
@@ -128,6 +130,7 @@ def _asked(
         timing,
         fix is Fix.AUTO,
         tuple(named.remarks),
+        keep_pictures,
     )
 
 
@@ -306,6 +309,12 @@ def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> W
 def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
     whole = replace(found, remarks=[*asked.remarks, *found.remarks])
     timing = usual if asked.timing is None else asked.timing
+    if asked.keep_pictures:
+        for remark in whole.all_remarks:
+            out.print(escape(remark))
+        made = with_pictures.recording(whole)
+        write(made if timing is None else made.with_header(twist_timing=timing), [], target)
+        return
     converted(whole, timing, asked.fix, target)
 
 

@@ -10,15 +10,15 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus import survey_json
-from pelorus.calibrated import Calibrated
-from pelorus.console import one_line, out, print_json
 from pelorus.converters.wheels import WHEEL
-from pelorus.frames import Config, Header, Kind, Process
-from pelorus.inertial_survey import ImuSurvey
-from pelorus.settings import IDS, describe
-from pelorus.small_sensors import SMALL_SENSORS
-from pelorus.survey import SensorSurvey, Survey, TrackSurvey, require_useful, survey
+from pelorus.evaluate import survey_json
+from pelorus.evaluate.inertial_survey import ImuSurvey
+from pelorus.evaluate.survey import SensorSurvey, Survey, TrackSurvey, require_useful, survey
+from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.program.console import one_line, out, print_json
+from pelorus.wire.calibrated import Calibrated
+from pelorus.wire.frames import Config, Header, Kind, Process
+from pelorus.wire.settings import IDS, describe
 
 GAPS_SHOWN = 5
 SPELLS_SHOWN = 40

@@ -16,11 +16,11 @@ from rich.markup import escape
 from pelorus.commands.another import run_command
 from pelorus.commands.choices import CONFIG, SETTINGS, settings_given
 from pelorus.commands.watching import VIEW, watching
-from pelorus.console import err, out, told
 from pelorus.errors import Existing, PelorusError
 from pelorus.live.camera import CAMERAS, Asked, Camera, open_camera
 from pelorus.live.port import FORMS
 from pelorus.online.diagnosis import Level, Status
+from pelorus.program.console import err, out, told
 
 if TYPE_CHECKING:
     from pelorus.live.intake import Intake

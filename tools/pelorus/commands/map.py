@@ -12,13 +12,13 @@ import typer
 from rich.markup import escape
 
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out, print_json
 from pelorus.errors import Existing
-from pelorus.extras import figures_missing
 from pelorus.grid import files, occupancy
 from pelorus.grid.occupancy import Band, Grid, Wish
 from pelorus.grid.sightings import sightings
-from pelorus.replay import result_of
+from pelorus.native.replay import result_of
+from pelorus.program.console import err, out, print_json
+from pelorus.program.extras import figures_missing
 
 app = typer.Typer()
 
@@ -93,8 +93,8 @@ def _publish(grid: Grid, title: str, folder: Path) -> None:
         err.print(escape(f"the map has no {files.PICTURE}: {missing}"))
         files.write(folder, grid, None)
         return
-    from pelorus import style  # noqa: PLC0415 - an extra
     from pelorus.grid import picture  # noqa: PLC0415 - as above
+    from pelorus.program import style  # noqa: PLC0415 - an extra
 
     files.write(folder, grid, lambda path: style.save(lambda: picture.draw(grid, title), path))
 

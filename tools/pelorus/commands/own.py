@@ -22,6 +22,12 @@ FIX = typer.Option(
     help="auto: find stale tracks, turned axes and a malformed lever from the data alone, say so "
     "and mend them; none: leave the data as they are.",
 )
+KEEP_PICTURES = typer.Option(
+    False,
+    "--keep-pictures",
+    help="Keep the pictures themselves, 8-bit grey, in the place of tracks: pelorus-replay then "
+    "follows the points with the library's own eyes. Name OUT.plr.zst, for they are large.",
+)
 CALIBRATION = typer.Option(
     [],
     metavar="FILE",

@@ -12,20 +12,21 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out, print_json, progress, step, steps, tell_verdict, waiting
+from pelorus.commands.verdicts import tell_verdict
 from pelorus.errors import Existing, PelorusError, made, whole_folder
-from pelorus.extras import figures_missing
-from pelorus.replay import find_programs
+from pelorus.io.trajectory import read_stamped
+from pelorus.native.replay import find_programs
+from pelorus.program.console import err, out, print_json, progress, step, steps, waiting
+from pelorus.program.extras import figures_missing
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
-from pelorus.trajectory import read_stamped
 
 if TYPE_CHECKING:
     from pelorus.check.verdict import Verdict
+    from pelorus.io.trajectory import Trajectory
     from pelorus.report.comparison import Comparison
     from pelorus.report.curves import Other
     from pelorus.report.results import Run
-    from pelorus.trajectory import Trajectory
 
 PAGE = "report.html"
 STEPS = 3
@@ -149,7 +150,7 @@ def _draw(
 
 def _other(name: str, way: Trajectory, main: Run, truth: Trajectory | None) -> Other:
     """Returns another program's path, moved to the first common pose; PelorusError without one."""
-    from pelorus.evaluation import assess, beside  # noqa: PLC0415 - scipy loads slowly
+    from pelorus.evaluate.evaluation import assess, beside  # noqa: PLC0415 - scipy loads slowly
     from pelorus.report.curves import Other  # noqa: PLC0415 - as above
 
     brought = beside(way, main.trajectory, SAME_NS)
@@ -163,7 +164,7 @@ def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, P
     if missing := figures_missing():
         err.print(escape(f"the report has no {', '.join(DRAWINGS)}: {missing}"))
         return []
-    from pelorus import style  # noqa: PLC0415 - an extra
+    from pelorus.program import style  # noqa: PLC0415 - an extra
     from pelorus.report import pictures  # noqa: PLC0415 - as above
 
     shown = []

@@ -12,16 +12,16 @@ import typer
 
 from pelorus.commands.choices import Timing
 from pelorus.commands.conversion import write
-from pelorus.console import err
 from pelorus.errors import PelorusError
-from pelorus.frames import TwistTiming
-from pelorus.recording import Recording
-from pelorus.simulation.imu import ImuFaults, SimulatedImu
-from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.readings import Sensing, options_without_meaning
-from pelorus.simulation.settings import Numbers, Span, option_name, settings_of
-from pelorus.simulation.simulate import Options, blindness, simulate
-from pelorus.small_sensors import SMALL_SENSORS, SmallSensor
+from pelorus.io.recording import Recording
+from pelorus.io.small_sensors import SMALL_SENSORS, SmallSensor
+from pelorus.program.console import err
+from pelorus.simulate.imu import ImuFaults, SimulatedImu
+from pelorus.simulate.mishaps import Mishaps
+from pelorus.simulate.readings import Sensing, options_without_meaning
+from pelorus.simulate.settings import Numbers, Span, option_name, settings_of
+from pelorus.simulate.simulate import Options, blindness, simulate
+from pelorus.wire.frames import TwistTiming
 
 TARGET = typer.Argument(..., metavar="OUT.plr", help="The recording to write.")
 

@@ -13,20 +13,20 @@ from typing import BinaryIO
 import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from pelorus import packed_file
 from pelorus.commands.choices import PROGRAMS
 from pelorus.commands.compare import compare_log
 from pelorus.commands.watching import VIEW, watching
-from pelorus.console import err, one_line, out
 from pelorus.errors import PelorusError, writing
 from pelorus.flight.judge import BitsVerdict
-from pelorus.frames import Kind, Message, Pose
+from pelorus.program.console import err, one_line, out
 from pelorus.robot.emulator import MACHINES
 from pelorus.robot.state import restored, saved
 from pelorus.robot.status import refusal
 from pelorus.robot.stream import ANSWER_S, Streamer, StreamResult
 from pelorus.robot.target import BAUD, FORMS, open_target
-from pelorus.wire import header_of, read_file
+from pelorus.wire import packed_file
+from pelorus.wire.frames import Kind, Message, Pose
+from pelorus.wire.framing import header_of, read_file
 
 TEXTS_SHOWN = 200
 BOARDS = ", ".join(MACHINES)
@@ -86,19 +86,13 @@ def stream(
     ),
 ) -> None:
     """Send a recording to a robot controller, real or emulated, as its sensors would."""
-    received, _ = read_file(source)
-    header_of(received, source)
-    messages = _first_frames([frame.message for frame in received], frames)
     if compare and restore_state:
         raise PelorusError("--compare knows no state that a board kept: leave --restore-state out")
     if any(moved) and not restore_state:
         raise PelorusError("--moved is of the time between two drives: it needs --restore-state")
-    if restore_state:
-        messages = restored(messages, moved)
-    if save_state:
-        messages = saved(messages)
-    if record is not None and record.exists() and record.samefile(source):
+    if record is not None and record.exists() and source.exists() and record.samefile(source):
         raise PelorusError(f"{record}: is the recording to send; --record needs another file")
+    messages = _to_send(source, frames, moved if restore_state else None, save_state)
     streamer: Streamer | None = None
     verdict = BitsVerdict.SAME
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
@@ -128,6 +122,18 @@ def stream(
         raise PelorusError(f"{to}: took {outcome.frames} frames and gave no pose")
     if verdict is not BitsVerdict.SAME:
         raise typer.Exit(verdict)
+
+
+def _to_send(
+    source: Path, frames: int | None, moved: tuple[float, float] | None, save_state: bool
+) -> list[Message]:
+    """Returns the recording's messages, with `moved` from a kept state on, not from a START."""
+    received, _ = read_file(source)
+    header_of(received, source)
+    messages = _first_frames([frame.message for frame in received], frames)
+    if moved is not None:
+        messages = restored(messages, moved)
+    return saved(messages) if save_state else messages
 
 
 def _first_frames(messages: list[Message], frames: int | None) -> list[Message]:

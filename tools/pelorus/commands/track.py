@@ -10,14 +10,14 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from pelorus.console import out, progress
 from pelorus.errors import PelorusError, resolved
-from pelorus.row_gaps import TOLD_ABOVE_PX, row_gaps
+from pelorus.io.tracks import Tracks
+from pelorus.program.console import out, progress
 from pelorus.tracking import images, output, sheet
 from pelorus.tracking.images import Gray, Pair
+from pelorus.tracking.row_gaps import TOLD_ABOVE_PX, row_gaps
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track as track_all
-from pelorus.tracks import Tracks
 
 USUAL = Settings()
 EXAMPLE = "pelorus track image_l image_r stereo.csv --rate 10 --sheet tracks.png"

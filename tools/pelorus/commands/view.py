@@ -11,9 +11,9 @@ import typer
 from rich.markup import escape
 
 from pelorus.commands.choices import CONFIG, LOG, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import out
 from pelorus.errors import PelorusError, whole, write_text
-from pelorus.replay import whole_log_of
+from pelorus.native.replay import whole_log_of
+from pelorus.program.console import out
 from pelorus.view.layout import layout
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from pathlib import Path
 import typer
 
 from pelorus.errors import Existing
-from pelorus.frames import Message
+from pelorus.wire.frames import Message
 
 VIEW = typer.Option(
     None,

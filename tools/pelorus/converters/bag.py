@@ -12,8 +12,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pelorus.errors import PelorusError
-from pelorus.extras import extra
-from pelorus.foreign import ForeignFileError
+from pelorus.io.foreign import ForeignFileError
+from pelorus.program.extras import extra
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader

@@ -18,7 +18,7 @@ from pathlib import Path
 from pelorus.converters import geodetic, instances, ulog
 from pelorus.converters.geodetic import Ground
 from pelorus.errors import PelorusError
-from pelorus.table import TIME_UNITS, Table
+from pelorus.io.table import TIME_UNITS, Table
 
 VELOCITY = {"mps": 1.0, "m/s": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "km/h": 1 / 3.6, "mmps": 1e-3}
 RATE = {"radps": 1.0, "rad/s": 1.0, "degps": pi / 180, "dps": pi / 180, "deg/s": pi / 180}

@@ -18,25 +18,25 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import foreign, trajectory
 from pelorus.converters import readings_csv, streams, twist_axes, wheels
 from pelorus.converters.columns import Columns, example
 from pelorus.converters.streams import RawTracks, Readings, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Reading, TwistTiming
-from pelorus.inertial import Inertial
-from pelorus.motion import Times
-from pelorus.recording import Recording
+from pelorus.io import foreign, trajectory
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.io.table import Table
+from pelorus.io.tracks import Tracks
+from pelorus.io.trajectory import Trajectory
+from pelorus.math.inertial import Inertial
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
-from pelorus.se3 import Poses
-from pelorus.small_sensors import SMALL_SENSORS
-from pelorus.table import Table
-from pelorus.tracks import Tracks
-from pelorus.trajectory import Trajectory
+from pelorus.wire.frames import Reading, TwistTiming
 
 ID_MAX = 2**32 - 1
 VELOCITIES = {

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pelorus import motion
 from pelorus.faults.finding import Finding
-from pelorus.frames import BodyAxes, Reading, Start, StartFlag
-from pelorus.layout import Floats, pack_symmetric
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.small_sensors import SMALL_SENSORS
+from pelorus.io.recording import Recording
+from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.math import motion
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import BodyAxes, Reading, Start, StartFlag
+from pelorus.wire.layout import Floats, pack_symmetric
 
 POSITION = next(sensor for sensor in SMALL_SENSORS if sensor.name == "position")
 LEVEL = {

@@ -18,21 +18,22 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import arrays, foreign, motion, se3, trajectory
 from pelorus.converters.streams import Asked, Pictures, Readings, Streams
 from pelorus.errors import PelorusError, resolved
-from pelorus.foreign import ForeignFileError
-from pelorus.inertial import Inertial
-from pelorus.motion import Times
-from pelorus.named import Named
+from pelorus.io import arrays, foreign, trajectory
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.io.trajectory import Trajectory
+from pelorus.math import motion, se3
+from pelorus.math.inertial import Inertial
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
 from pelorus.rig import kalibr
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import rigid
-from pelorus.se3 import Poses
 from pelorus.tracking import images
 from pelorus.tracking.images import Pair
-from pelorus.trajectory import Trajectory
 
 CAMERAS = ("cam0", "cam1")
 IMU = "imu0"

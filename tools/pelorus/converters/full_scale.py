@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from pelorus.faults.finding import Finding
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math.inertial import Inertial
+from pelorus.wire.layout import Floats
 
 SAME = 1e-5  # of the largest number, for rounding
 BELOW = 0.95  # share of it from which numbers count as slightly smaller

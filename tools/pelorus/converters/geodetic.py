@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.extras import extra
-from pelorus.foreign import ForeignFileError
-from pelorus.layout import Floats
-from pelorus.table import Table
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.table import Table
+from pelorus.program.extras import extra
+from pelorus.wire.layout import Floats
 
 if TYPE_CHECKING:
     from pyproj import CRS

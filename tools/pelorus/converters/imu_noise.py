@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import inertial
 from pelorus.faults.finding import Finding
-from pelorus.inertial import Inertial, MotionState
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math import inertial
+from pelorus.math.inertial import Inertial, MotionState
+from pelorus.math.motion import Times
+from pelorus.wire.layout import Floats
 
 MAD_TO_SIGMA = 1.4826  # of a normal distribution
 FAITHFUL = 1.5  # ratio to the given noise, above which the readings do not fit

@@ -19,15 +19,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pelorus import arrays, foreign, se3
-from pelorus.arrays import Arrays
 from pelorus.converters import imu_noise, renewal
 from pelorus.errors import PelorusError
-from pelorus.faults.axes import body_axes
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import (
+from pelorus.io import arrays, foreign
+from pelorus.io.arrays import Arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math import se3
+from pelorus.math.axes import body_axes
+from pelorus.math.inertial import Inertial
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import (
     Header,
     Noise,
     Process,
@@ -36,13 +43,7 @@ from pelorus.frames import (
     TwistTiming,
     header_name,
 )
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats, pack_symmetric
-from pelorus.motion import Times
-from pelorus.named import Named
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.tracks import Tracks
+from pelorus.wire.layout import Floats, pack_symmetric
 
 QUATERNION_NORM_TOLERANCE = 1e-3
 ALIGNED_M = 1e-4  # tolerance of the right camera's place in the left one: (baseline, 0, 0)

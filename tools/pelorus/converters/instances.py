@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
-from pelorus.foreign import BAD_ROWS_MAX, ForeignFileError
-from pelorus.table import Table
+from pelorus.io.foreign import BAD_ROWS_MAX, ForeignFileError
+from pelorus.io.table import Table
 
 SENSORS_MAX = 16
 UNNAMED_MAX = 4  # in a column of any name, which may as well count the readings of a batch

@@ -16,20 +16,21 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import arrays, foreign, motion, se3, trajectory
-from pelorus.console import progress
 from pelorus.converters.streams import Asked, Pictures, Streams, Twists
 from pelorus.errors import PelorusError, resolved
-from pelorus.foreign import ForeignFileError
-from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.io import arrays, foreign, trajectory
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.trajectory import Trajectory
+from pelorus.math import motion, se3
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
+from pelorus.program.console import progress
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
 from pelorus.tracking import images
-from pelorus.trajectory import Trajectory
+from pelorus.wire.layout import Floats
 
 EARTH_M = 6378137.0
 OXTS_NUMBERS = 30

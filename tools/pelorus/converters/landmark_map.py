@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import wire
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import UNKNOWN_VARIANCE, Header, Landmark
-from pelorus.layout import Floats, pack_symmetric, unpack_symmetric
-from pelorus.motion import Times
-from pelorus.recording import Recording
-from pelorus.table import Table
-from pelorus.tracks import Tracks
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.table import Table
+from pelorus.io.tracks import Tracks
+from pelorus.math.motion import Times
+from pelorus.wire import framing
+from pelorus.wire.frames import UNKNOWN_VARIANCE, Header, Landmark
+from pelorus.wire.layout import Floats, pack_symmetric, unpack_symmetric
 
 ID_MAX = 2**32 - 1
 POSITION = ("x_m", "y_m", "z_m")
@@ -42,8 +42,8 @@ class MapPoints(NamedTuple):
 
 def convert(source: Path, like: Path) -> Recording:
     """Returns a recording without data: the HEADER of `like`, and the landmarks as known ones."""
-    received, _ = wire.read_file(like)
-    header = wire.header_of(received, like)
+    received, _ = framing.read_file(like)
+    header = framing.header_of(received, like)
     points = _csv(source)
     _check(source, points)
     packed = pack_symmetric(points.covariance)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.frames import End, Message, Text, Twist
+from pelorus.wire import framing
+from pelorus.wire.frames import End, Message, Text, Twist
 
 LATE_MOST_S = 2.0
 
@@ -25,11 +25,11 @@ def convert(source: Path, late_s: float, target: Path) -> int:
         raise PelorusError(
             f"--late {late_s:g}: seconds are expected, up to {LATE_MOST_S:g}, and not 0"
         )
-    messages = wire.messages_of(source)
+    messages = framing.messages_of(source)
     twists = [m for m in messages if isinstance(m, Twist)]
     if not twists:
         raise PelorusError(f"{source}: holds no twists whose rates of turn could be moved")
-    wire.write_file(target, _moved(messages, twists, late_s), len(messages))
+    framing.write_file(target, _moved(messages, twists, late_s), len(messages))
     return len(twists)
 
 

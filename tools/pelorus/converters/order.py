@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtri
 
-from pelorus import arrays, foreign, stamps
 from pelorus.converters.bag import NS, Bag
-from pelorus.foreign import ForeignFileError
-from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.io import arrays, foreign, stamps
+from pelorus.io.foreign import ForeignFileError
+from pelorus.math.motion import Times
+from pelorus.wire.layout import Floats
 
 TWICE = 1.5  # ratio of messages in a time that is covered twice to one covered once
 TEETH_MIN = 8  # messages that a stretch needs, so that two combs are no stumble of the driver

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Reading
-from pelorus.layout import Floats
-from pelorus.schema import PLAUSIBLE
-from pelorus.small_sensors import SmallSensor
-from pelorus.table import Table
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.small_sensors import SmallSensor
+from pelorus.io.table import Table
+from pelorus.wire.frames import Reading
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import PLAUSIBLE
 
 ARM = ("at_x_m", "at_y_m", "at_z_m")
 # Beyond these the filter refuses a reading (plr_filter_measure).

@@ -16,15 +16,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import evaluation, se3
+from pelorus.evaluate import evaluation
 from pelorus.faults.finding import Finding
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Camera, Text
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.tracks import Indices, Tracks, point_jacobian, project, triangulate
-from pelorus.trajectory import Trajectory
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Indices, Tracks, point_jacobian, project, triangulate
+from pelorus.io.trajectory import Trajectory
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Camera, Text
+from pelorus.wire.layout import Floats
 
 PASSES = 8  # of Gauss-Newton: a point from stereo is near
 DISPARITY_MIN_PX = 0.5

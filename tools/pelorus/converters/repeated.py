@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from pelorus.faults.finding import Finding
 from pelorus.faults.two_views import two_views
-from pelorus.frames import Camera
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.tracks import Tracks
+from pelorus.io.tracks import Tracks
+from pelorus.math.motion import Times
+from pelorus.wire.frames import Camera
+from pelorus.wire.layout import Floats
 
 Flags = NDArray[np.bool_]
 SUBJECT = "repeated frames"

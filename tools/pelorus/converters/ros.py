@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from pelorus import se3
 from pelorus.converters import ros_frames, ros_motion, ros_positions, ros_wheels
 from pelorus.converters.bag import Bag
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
@@ -14,6 +13,7 @@ from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Readings, Streams, Twists
 from pelorus.converters.transforms import TF, Chain, Tree, bare
 from pelorus.errors import PelorusError, resolved
+from pelorus.math import se3
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import Rig

@@ -15,24 +15,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import motion
-from pelorus.console import progress
 from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.order import Stamps, in_order, leave_out, sound
 from pelorus.converters.streams import Pictures, RawTracks
 from pelorus.converters.transforms import bare
 from pelorus.errors import PelorusError
-from pelorus.extras import cv2
-from pelorus.foreign import ForeignFileError
-from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.tracks import Tracks
+from pelorus.math import motion
+from pelorus.math.motion import Times
+from pelorus.program.console import progress
+from pelorus.program.extras import cv2
 from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray
 from pelorus.rig.rig import Rig
 from pelorus.tracking import images
-from pelorus.tracks import Tracks
+from pelorus.wire.layout import Floats
 
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"

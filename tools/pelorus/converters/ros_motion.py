@@ -10,20 +10,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus.console import progress
 from pelorus.converters import streams, twist_axes
 from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.order import Stamps, in_order, sound, spread
 from pelorus.converters.streams import Asked, Readings, Twists
 from pelorus.converters.transforms import Tree, bare
 from pelorus.errors import PelorusError
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import TwistTiming
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.se3 import Poses
-from pelorus.trajectory import QUATERNION_NORM_TOLERANCE, Trajectory
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.trajectory import QUATERNION_NORM_TOLERANCE, Trajectory
+from pelorus.math.inertial import Inertial
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
+from pelorus.program.console import progress
+from pelorus.wire.frames import TwistTiming
+from pelorus.wire.layout import Floats
 
 # Message types with twists, and how to read these.
 TWISTS: dict[str, Callable[[Any], Any]] = {

@@ -11,10 +11,10 @@ from pelorus.converters.bag import Bag
 from pelorus.converters.geodetic import Ground
 from pelorus.converters.ros_motion import rows_of
 from pelorus.converters.transforms import Tree
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Reading
-from pelorus.layout import Floats
-from pelorus.small_sensors import SMALL_SENSORS
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.wire.frames import Reading
+from pelorus.wire.layout import Floats
 
 FIX = "sensor_msgs/msg/NavSatFix"
 SENSOR = next(sensor for sensor in SMALL_SENSORS if sensor.name == "position")

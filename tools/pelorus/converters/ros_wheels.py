@@ -18,10 +18,10 @@ from pelorus.converters.streams import BLIND_VELOCITY_MPS
 from pelorus.converters.transforms import Tree
 from pelorus.converters.wheels import WHEEL, Rolling
 from pelorus.errors import PelorusError
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Reading
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
+from pelorus.io.foreign import ForeignFileError
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Reading
+from pelorus.wire.layout import Floats
 
 SIGMA_MAX_MPS = 10.0  # a larger one means "not measured"
 

@@ -17,18 +17,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.console import progress
 from pelorus.converters import earth_start, full_scale, repeated, twist_noise
 from pelorus.errors import PelorusError
 from pelorus.faults import resolution, stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
-from pelorus.inertial import NO_READINGS, Inertial
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.recording import Recording
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.io.trajectory import Trajectory, filled
+from pelorus.math.inertial import NO_READINGS, Inertial
+from pelorus.math.motion import Times
+from pelorus.program.console import progress
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray, Rectification
@@ -36,8 +36,8 @@ from pelorus.rig.rig import Rig
 from pelorus.tracking import images
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
-from pelorus.tracks import Tracks
-from pelorus.trajectory import Trajectory, filled
+from pelorus.wire.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
+from pelorus.wire.layout import Floats
 
 FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
@@ -103,6 +103,7 @@ class Asked:
     timing: TwistTiming | None = None
     fix: bool = True
     remarks: tuple[str, ...] = ()
+    keep_pictures: bool = False
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
     if calibrated.rig is not None:
         t_ns = calibrated.rig.on_body_clock(t_ns)
     _require_overlap(frames, t_ns, streams.motion)
-    truth = None if streams.truth is None else _at_frames(streams.truth, t_ns, streams.motion)
+    truth = None if streams.truth is None else at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
         repeats = repeated.Repeats(_moves(streams.motion, t_ns), t_ns)
         header, tracks = _tracked(frames, calibrated, settings or Settings(), repeats)
@@ -174,7 +175,7 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
             tracks = _rectified(tracks, rectification, frames.where)
         moves = _moves(streams.motion, t_ns)
         t_ns, tracks, found = repeated.left_out(moves, t_ns, tracks, header.camera)
-    made = _with_motion(header, streams, t_ns, tracks)
+    made = with_motion(header, streams, t_ns, tracks)
     if isinstance(streams.motion, Readings):
         made, more = full_scale.with_ranges(made, streams.motion.inertial)
         found = [*found, *more]
@@ -214,7 +215,8 @@ def converted(
 # --- motion ---------------------------------------------------------------------------------------
 
 
-def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
+def with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
+    """Returns a recording of the tracks with the streams' twists or IMU, and their remarks."""
     remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.all_remarks]
     motion = streams.motion
     if isinstance(motion, Twists):
@@ -451,7 +453,7 @@ def _tracked(
 # --- truth ----------------------------------------------------------------------------------------
 
 
-def _at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -> Trajectory:
+def at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -> Trajectory:
     """Returns the truth while the sensors run, with a pose at each frame and where the motion
     begins.
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import se3
-from pelorus.console import progress
 from pelorus.converters.bag import Bag
 from pelorus.errors import PelorusError
-from pelorus.se3 import IDENTITY, Poses
+from pelorus.math import se3
+from pelorus.math.se3 import IDENTITY, Poses
+from pelorus.program.console import progress
 
 TF = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 STATIC = "tf_static"

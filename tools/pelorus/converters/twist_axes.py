@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import fdtri
 
-from pelorus import motion
 from pelorus.converters.streams import TwistIn, Twists
 from pelorus.errors import PelorusError
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import TwistTiming
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
+from pelorus.io.foreign import ForeignFileError
+from pelorus.math import motion
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import TwistTiming
+from pelorus.wire.layout import Floats
 
 CHANCE = 1e-4  # probability that twists in the body's axes look like those of the world
 RESTS = 1e-6  # m and rad: largest change of a pose at rest

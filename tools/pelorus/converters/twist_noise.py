@@ -17,13 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3, visual_motion
 from pelorus.faults.finding import Finding
-from pelorus.frames import TwistTiming
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.tracking import visual_motion
+from pelorus.tracking.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
+from pelorus.wire.frames import TwistTiming
+from pelorus.wire.layout import Floats
 
 PAIRS_ENOUGH = 2 * PAIRS_MIN  # so that each half has enough
 FRAMES_ENOUGH = 100  # a spread from so many is good to 10 %

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from pelorus import foreign
-from pelorus.extras import extra
-from pelorus.foreign import ForeignFileError
-from pelorus.table import Table
+from pelorus.io import foreign
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.table import Table
+from pelorus.program.extras import extra
 
 MAGIC = b"ULog\x01\x12\x35"
 COMBINED, SUMMED = "sensor_combined", "vehicle_imu"

@@ -13,11 +13,11 @@ from itertools import groupby
 
 import numpy as np
 
-from pelorus.frames import Reading
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.se3 import Poses
-from pelorus.small_sensors import SMALL_SENSORS
+from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Reading
+from pelorus.wire.layout import Floats
 
 WHEEL, STANDSTILL = (
     next(sensor for sensor in SMALL_SENSORS if sensor.name == name)

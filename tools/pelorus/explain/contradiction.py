@@ -14,15 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import motion, se3
 from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.inputs import AXES
 from pelorus.explain.log import FilterLog, Flags, runs, suspect
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.se3 import Poses
-from pelorus.tracks import Tracks
-from pelorus.visual_motion import PAIRS_MIN, distance2, estimate, rigid, seen_pairs
+from pelorus.io.tracks import Tracks
+from pelorus.math import motion, se3
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
+from pelorus.tracking.visual_motion import PAIRS_MIN, distance2, estimate, rigid, seen_pairs
+from pelorus.wire.layout import Floats
 
 APART_S = 2.0  # stretches with a shorter gap are joined
 LOOK_BACK_S = 2.0  # before the supervisor is sure

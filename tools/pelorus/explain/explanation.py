@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pelorus import schema
+from pelorus.evaluate.health import LOST, Spell, TimeLine, time_line
 from pelorus.explain.contradiction import contradictions
 from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.inputs import of_inputs, rejected
@@ -18,8 +18,8 @@ from pelorus.explain.log import FEW, FilterLog, Flags, log_of, runs
 from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
 from pelorus.explain.small import of_small
 from pelorus.explain.stamps import of_stamps
-from pelorus.frames import Kind, Message, Text
-from pelorus.health import LOST, Spell, TimeLine, time_line
+from pelorus.wire import schema
+from pelorus.wire.frames import Kind, Message, Text
 
 if TYPE_CHECKING:
     from pelorus.check.verdict import Verdict

@@ -13,10 +13,10 @@ from scipy.ndimage import median_filter
 
 from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.log import CONTRADICTED, FEW, FilterLog, Flags, period, runs, suspect
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.schema import number
-from pelorus.visual_motion import PAIRS_MIN
+from pelorus.math.motion import Times
+from pelorus.tracking.visual_motion import PAIRS_MIN
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import number
 
 FROZEN_IMAGE = number("reason", "FROZEN_IMAGE")
 AXES = "xyz"

@@ -12,16 +12,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import schema
 from pelorus.errors import PelorusError
-from pelorus.evidence import Evidence, EvidenceFlag
-from pelorus.frames import Header, Imu, Kind, Message, Pose, Report, Stereo, Twist
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.schema import number
-from pelorus.settings import in_force
-from pelorus.trajectory import is_finite
-from pelorus.wire import header_of_messages
+from pelorus.io.trajectory import is_finite
+from pelorus.math.motion import Times
+from pelorus.wire import schema
+from pelorus.wire.evidence import Evidence, EvidenceFlag
+from pelorus.wire.frames import Header, Imu, Kind, Message, Pose, Report, Stereo, Twist
+from pelorus.wire.framing import header_of_messages
+from pelorus.wire.layout import Floats
+from pelorus.wire.schema import number
+from pelorus.wire.settings import in_force
 
 Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]

@@ -13,7 +13,7 @@ import numpy as np
 
 from pelorus.explain.inputs import is_habit, losses
 from pelorus.explain.log import NO_READING, FilterLog, Flags, period
-from pelorus.schema import STATUSES, number
+from pelorus.wire.schema import STATUSES, number
 
 MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
     number("reason", name)

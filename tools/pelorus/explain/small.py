@@ -9,9 +9,9 @@ import numpy as np
 
 from pelorus.explain.incident import Cause, Incident
 from pelorus.explain.log import FilterLog, runs
-from pelorus.frames import Message, Reading
-from pelorus.schema import SENSORS, number
-from pelorus.small_sensors import name_of
+from pelorus.io.small_sensors import name_of
+from pelorus.wire.frames import Message, Reading
+from pelorus.wire.schema import SENSORS, number
 
 REJECTED = number("reason", "READINGS_REJECTED")
 FRAMES_LEAST = 2  # frames: a single one is no event

@@ -13,8 +13,8 @@ import numpy as np
 
 from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.log import NO_READING, FilterLog, period
-from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.math.motion import Times
+from pelorus.wire.layout import Floats
 
 BEFORE, AFTER = 10, 5  # frames whose median gives the lead before and after
 MAD = 1.4826  # of a normal distribution: sigma over the median absolute deviation

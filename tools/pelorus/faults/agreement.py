@@ -19,9 +19,9 @@ from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews, two_views
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.tracks import Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.wire.layout import Floats
 
 NO_BIAS_MPS = 1e-4
 BIAS_MPS = 0.1  # m/s, sigma of the velocity's bias, as the filter's setting

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from pelorus.faults.agreement import Agreement
 from pelorus.faults.fault import Fault
-from pelorus.frames import TwistTiming
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire.frames import TwistTiming
+from pelorus.wire.layout import Floats
 
 SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
 # Used where the HEADER has no bias. With the filter's own default, which is smaller, 7 of 38 good

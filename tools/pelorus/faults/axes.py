@@ -8,44 +8,22 @@ convention is assumed. Remedy: T_CB diag(F, 1).
 
 from __future__ import annotations
 
-from itertools import permutations, product
-
 import numpy as np
 
-from pelorus import se3
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
 from pelorus.faults.likelihood import with_ratio
-from pelorus.frames import BodyAxes
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.visual_motion import SeenPairs, seen_pairs
+from pelorus.io.recording import Recording
+from pelorus.math.axes import name, turns
+from pelorus.math.se3 import Poses
+from pelorus.tracking.visual_motion import SeenPairs, seen_pairs
+from pelorus.wire.layout import Floats
 
 SUBJECT = "body axes"
 LAG = 5
 RATIO_MAX = 0.6  # least improvement: the error falls to this share of the given one
 SHARE_MIN = 0.75  # share of the frames in which it must fall
 Z_MIN = 3.0  # and with this significance
-
-LETTERS = (("forward", "backward"), ("left", "right"), ("up", "down"))
-FORWARD_LEFT_UP_IN_CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-
-
-def ways() -> list[Floats]:
-    """Returns the 48 matrices that permute axes and change their signs; identity first."""
-    found: list[Floats] = []
-    for order in permutations(range(3)):
-        for signs in product((1.0, -1.0), repeat=3):
-            F: Floats = np.zeros((3, 3))
-            F[range(3), order] = signs
-            found.append(F)
-    return found
-
-
-def turns() -> list[Floats]:
-    """Returns the 24 of them that are rotations."""
-    return [F for F in ways() if np.linalg.det(F) > 0]
 
 
 def mend(recording: Recording) -> tuple[Recording, Finding]:
@@ -92,22 +70,3 @@ def _text(F: Floats) -> str:
     if np.count_nonzero(F - np.diag(np.diag(F))) == 0:
         return f"diag({', '.join(f'{x:.0f}' for x in np.diag(F))})"
     return str(F.astype(int).tolist())
-
-
-def name(R_CB: Floats) -> str:
-    """Returns the body axes in words, for a camera that looks forward."""
-    R = se3.nearest_rotation(R_CB)
-    in_camera = FORWARD_LEFT_UP_IN_CAMERA.T @ R  # columns: body axes in forward, left, up
-    words = []
-    for axis in in_camera.T:
-        which = int(np.argmax(np.abs(axis)))
-        words.append(LETTERS[which][int(axis[which] < 0)])
-    return "-".join(words)
-
-
-def body_axes(R_CB: Floats) -> BodyAxes:
-    """Returns the HEADER's name of the body axes, for a camera that looks forward."""
-    return {
-        "forward-left-up": BodyAxes.FORWARD_LEFT_UP,
-        "forward-right-down": BodyAxes.FORWARD_RIGHT_DOWN,
-    }.get(name(R_CB), BodyAxes.OTHER)

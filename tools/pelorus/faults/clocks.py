@@ -16,8 +16,8 @@ import numpy as np
 from pelorus.faults.fit import CLOCK, TURN_CLOCK, Body, Fit
 from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire.layout import Floats
 
 FRAMES_MIN = 50
 OFFSETS_S = np.arange(-20, 21) * 0.02  # where the search for the offset starts

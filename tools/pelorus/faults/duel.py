@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pelorus.faults.likelihood import of_share
-from pelorus.layout import Floats
+from pelorus.wire.layout import Floats
 
 TOO_FEW = "too few common tracks to judge"
 

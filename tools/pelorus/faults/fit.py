@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.faults.seen import CameraMotion
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.tracks import Indices
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Indices
+from pelorus.wire.layout import Floats
 
 ROUNDS = 8
 BLOCKS_LEAST, BLOCKS_MOST, BLOCK_FRAMES = 8, 60, 5

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
 from pelorus.faults.seen import pauses
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
+from pelorus.math import se3
+from pelorus.math.inertial import Inertial
+from pelorus.math.se3 import Poses
+from pelorus.wire.layout import Floats
 
 STRETCH_S = 10.0
 STRETCH_FRAMES = 20

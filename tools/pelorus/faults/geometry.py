@@ -24,7 +24,6 @@ from pelorus.faults.amounts import (
     of_scale,
     of_scale_by_imu,
 )
-from pelorus.faults.axes import turns
 from pelorus.faults.fault import UNTOLD, Fault
 from pelorus.faults.handeye import (
     FRAMES_ENOUGH,
@@ -40,8 +39,9 @@ from pelorus.faults.seen import CameraMotion
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews
 from pelorus.faults.world_axes import world_axes
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math.axes import turns
+from pelorus.wire.layout import Floats
 
 FIT_LEAST = 0.6  # share of the point pairs that one motion explains
 LEFT_MOST = 0.7  # share of a motion's size that the twists leave unexplained

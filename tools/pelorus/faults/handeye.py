@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
 from pelorus.faults.seen import GAP_PERIODS, pauses
 from pelorus.faults.two_views import TwoViews
-from pelorus.layout import Floats
-from pelorus.motion import held
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.motion import held
+from pelorus.wire.layout import Floats
 
 SEEN_MOST = 60_000  # observations, which determine the time it takes
 POINTS_MIN = 6  # of a pair of frames

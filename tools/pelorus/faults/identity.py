@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtrc
 
-from pelorus import se3
 from pelorus.faults.likelihood import of_share
 from pelorus.faults.two_views import TwoViews
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.second_view import measured, predicted
-from pelorus.tracks import Indices, Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Indices, Tracks
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.tracking.second_view import measured, predicted
 
 Flags = NDArray[np.bool_]
 ROWS_LEAST = 4

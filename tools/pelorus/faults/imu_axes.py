@@ -19,16 +19,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
-from pelorus.faults.axes import ways
 from pelorus.faults.fit import WITHIN, Design, Fit
 from pelorus.faults.force import NO_BREAKS, by_images, force
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import CameraMotion, Motions
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.tracks import Indices
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Indices
+from pelorus.math import se3
+from pelorus.math.axes import ways
+from pelorus.math.inertial import Inertial
+from pelorus.wire.layout import Floats
 
 LIMIT = 50.0  # by which d^2, of 18 degrees of freedom, may exceed the least
 UNFIT, UNFIT_SHARE = 300.0, 0.2  # above this, and this share of the given axes' d^2, none fits

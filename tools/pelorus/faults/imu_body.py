@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
 from pelorus.faults.fit import (
     BIAS,
     CLOCK,
@@ -33,9 +32,10 @@ from pelorus.faults.fit import (
 )
 from pelorus.faults.force import Force, by_gyro, force, mean_rates, rates_of_turn, thinned
 from pelorus.faults.seen import CameraMotion, Motions, slope
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.inertial import Inertial
+from pelorus.wire.layout import Floats
 
 Flags = NDArray[np.bool_]
 START_MPS, GRAVITY_MPS2 = 100.0, 100.0  # sigmas of the start of a stretch

@@ -17,14 +17,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import visual_motion
 from pelorus.faults.finding import Finding
 from pelorus.faults.likelihood import of_estimate, with_ratio
-from pelorus.frames import TwistTiming
-from pelorus.layout import Floats
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
-from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
+from pelorus.io.recording import Recording
+from pelorus.math.se3 import Poses
+from pelorus.tracking import visual_motion
+from pelorus.tracking.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
+from pelorus.wire.frames import TwistTiming
+from pelorus.wire.layout import Floats
 
 SUBJECT = "lever of the extrinsic"
 LAG = 3

@@ -15,7 +15,7 @@ from pelorus.faults.fault import UNTOLD, Fault
 from pelorus.faults.finding import Finding
 from pelorus.faults.geometry import Judged
 from pelorus.faults.named import judged
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
 
 NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"

@@ -21,11 +21,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pelorus import se3
-from pelorus.faults.axes import ways
 from pelorus.faults.fit import TELLS_SIGMAS
 from pelorus.faults.likelihood import of_estimate
-from pelorus.layout import Floats
+from pelorus.math import se3
+from pelorus.math.axes import ways
+from pelorus.wire.layout import Floats
 
 BESIDE = (1, 2)
 EXPLAINED_LEAST = 0.3

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pelorus.faults.two_views import TwoViews, two_views
-from pelorus.frames import Camera
-from pelorus.tracks import Tracks
+from pelorus.io.tracks import Tracks
+from pelorus.wire.frames import Camera
 
 FAR_LAG = 3  # frames
 OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 inliers

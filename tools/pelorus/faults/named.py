@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.evaluate.inertial_survey import longest_run, readings_of
 from pelorus.faults import identity, sync
 from pelorus.faults.fault import Fault
 from pelorus.faults.geometry import Judged, geometry
@@ -24,10 +25,9 @@ from pelorus.faults.moving import Moving, moving
 from pelorus.faults.resolution import of_resolution
 from pelorus.faults.seen import CameraMotion, pauses
 from pelorus.faults.two_views import TwoViews, two_views
-from pelorus.frames import Imu, Message, Stereo, Twist
-from pelorus.inertial_survey import longest_run, readings_of
-from pelorus.motion import Times
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math.motion import Times
+from pelorus.wire.frames import Imu, Message, Stereo, Twist
 
 Flags = NDArray[np.bool_]
 SWAPPED_SHARE = 0.5

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from pelorus.faults.force import seconds
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import CameraMotion
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire.layout import Floats
 
 Flags = NDArray[np.bool_]
 WINDOW_S, USUAL_S, JOIN_S = 1.0, 20.0, 1.5

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from pelorus.faults.fault import Fault
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.wire.layout import Floats
 
 ROWS_LEAST = 1000
 BEYOND_PX, BEYOND_SHARE = 5.0, 0.01  # a tracker may predict a little outside

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
 from pelorus.faults.two_views import TwoViews, two_views
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.recording import Recording
-from pelorus.tracks import Tracks
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Tracks
+from pelorus.math import se3
+from pelorus.math.motion import Times
+from pelorus.wire.layout import Floats
 
 POINTS_MIN = 6  # of a pair of frames
 LONGER = 0.02  # change of the focal length for its derivative

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.faults.finding import Finding
-from pelorus.recording import Recording
-from pelorus.tracks import Pairs, Tracks, project
-from pelorus.visual_motion import seen_pairs
+from pelorus.io.recording import Recording
+from pelorus.io.tracks import Pairs, Tracks, project
+from pelorus.tracking.visual_motion import seen_pairs
 
 SUBJECT = "stale tracks"
 MOVED_MIN_PX = 0.1  # median image motion that the twists must predict

@@ -16,10 +16,10 @@ import numpy as np
 
 from pelorus.faults.fault import Fault
 from pelorus.faults.seen import standard_error
-from pelorus.frames import Camera
-from pelorus.layout import Floats
-from pelorus.motion import Times
-from pelorus.tracks import Tracks
+from pelorus.io.tracks import Tracks
+from pelorus.math.motion import Times
+from pelorus.wire.frames import Camera
+from pelorus.wire.layout import Floats
 
 ROWS_LEAST = 500
 SIGMAS, APART_S, HARM_PX = 6.0, 1.5e-3, 0.3

@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
 from pelorus.faults.fit import (
     BIAS,
     CLOCK,
@@ -27,10 +26,11 @@ from pelorus.faults.fit import (
     Design,
 )
 from pelorus.faults.seen import CameraMotion, beside, pauses, slope
-from pelorus.layout import Floats
-from pelorus.motion import dead_reckoning
-from pelorus.recording import Recording
-from pelorus.se3 import Poses
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.math.motion import dead_reckoning
+from pelorus.math.se3 import Poses
+from pelorus.wire.layout import Floats
 
 ONE_CLOCK_S, OWN_CLOCK_S = 1e-6, 0.3  # prior sigmas of the rates' delay behind the velocities
 SPREAD_MOST = 3.0  # factor on the usual difference of images and twists

@@ -5,8 +5,8 @@ Both views of a point are measured with the same noise, and the point itself is 
 points maximise the likelihood of all four pictures. A point is its left pixel and its disparity, so
 that far points, whose disparity noise may take below zero, need not be left out; and every step
 linearises at the point by both views together. Taking points from the first view alone, as
-pelorus.visual_motion does, shortens every displacement by about 1 %, which is the size of what is
-measured here.
+pelorus.tracking.visual_motion does, shortens every displacement by about 1 %, which is the size of
+what is measured here.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
-from pelorus.console import progress
-from pelorus.frames import Camera
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
-from pelorus.second_view import NOISE, apply, inverse, linearised, measured, product
-from pelorus.tracks import Indices, Tracks, sum_by_frame
+from pelorus.io.tracks import Indices, Tracks, sum_by_frame
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.program.console import progress
+from pelorus.tracking.second_view import NOISE, apply, inverse, linearised, measured, product
+from pelorus.wire.frames import Camera
+from pelorus.wire.layout import Floats
 
 ROW_GAP_MAX_PX = 4.0  # a rectified pair shows a point in one row; more is a bad match
 ITERATIONS, WIDE_ITERATIONS = 8, 3

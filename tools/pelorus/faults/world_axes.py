@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pelorus import se3
 from pelorus.faults.fit import BLOCKS_LEAST
 from pelorus.faults.handeye import mean_twists
 from pelorus.faults.seen import BLOCKS, CameraMotion, standard_error
 from pelorus.faults.twist_body import TwistBody
-from pelorus.layout import Floats
-from pelorus.recording import Recording
+from pelorus.io.recording import Recording
+from pelorus.math import se3
+from pelorus.wire.layout import Floats
 
 ROUNDS = 8
 MOVES_SHARE = 0.1  # share of the usual speed by the pictures

@@ -13,11 +13,11 @@ from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from pelorus.console import waiting
 from pelorus.errors import PelorusError
-from pelorus.extras import extra
 from pelorus.fleet.examine import OTHER, Work, digest_of_tools, examine_on_worker
 from pelorus.fleet.row import Found, Row
+from pelorus.program.console import waiting
+from pelorus.program.extras import extra
 
 if TYPE_CHECKING:
     from distributed import Client

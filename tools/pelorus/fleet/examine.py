@@ -15,20 +15,20 @@ from pathlib import Path
 from typing import Any
 
 import pelorus
-from pelorus import packed_file
 from pelorus.check.checked import check
 from pelorus.check.options import options_of
-from pelorus.consistency import Figures
-from pelorus.console import err
 from pelorus.errors import PelorusError, made
-from pelorus.evaluation import judge, path_m
+from pelorus.evaluate.evaluation import judge, path_m
 from pelorus.fleet.pieces import PIECE_BYTES, holds_answers, in_pieces
 from pelorus.fleet.row import Found, Row, finite
 from pelorus.fleet.whole import EVALUATED, Course, Part, columns_of, is_answered
-from pelorus.frames import Kind, Message
-from pelorus.replay import Outputs, find_programs, replay
-from pelorus.trajectory import estimate_in
-from pelorus.wire import Counts, Writer
+from pelorus.io.trajectory import estimate_in
+from pelorus.math.consistency import Figures
+from pelorus.native.replay import Outputs, find_programs, replay
+from pelorus.program.console import err
+from pelorus.wire import packed_file
+from pelorus.wire.frames import Kind, Message
+from pelorus.wire.framing import Counts, Writer
 
 LOST = ("damaged", "malformed", "too_long")  # counts of frames that are left out
 

@@ -10,8 +10,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from pelorus.frames import Config, Header, Landmark, Message, Pose, Role, Stereo
-from pelorus.wire import Counts, end_of, frames_in, without_header
+from pelorus.wire.frames import Config, Header, Landmark, Message, Pose, Role, Stereo
+from pelorus.wire.framing import Counts, end_of, frames_in, without_header
 
 PIECE_BYTES = 16 << 20  # of frames on the wire: ten minutes of 60 points at 10 Hz, with the answers
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pelorus.errors import PelorusError, whole, writing
-from pelorus.extras import extra
 from pelorus.fleet.row import COLUMNS, Row
+from pelorus.program.extras import extra
 
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection

@@ -11,14 +11,14 @@ import numpy as np
 
 from pelorus.check.known import Known
 from pelorus.check.verdict import Grade, Verdict, judged_log
-from pelorus.consistency import Figures
-from pelorus.evaluation import judge, path_m
+from pelorus.evaluate.evaluation import judge, path_m
 from pelorus.explain import Explanation, explain
 from pelorus.explain.incident import Cause, Incident
 from pelorus.fleet.row import finite
-from pelorus.frames import Config, Header, Kind, Landmark, Message, Pose, Report, Role, Truth
-from pelorus.se3 import Poses
-from pelorus.trajectory import Trajectory, estimate_in, truth_in
+from pelorus.io.trajectory import Trajectory, estimate_in, truth_in
+from pelorus.math.consistency import Figures
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import Config, Header, Kind, Landmark, Message, Pose, Report, Role, Truth
 
 POSES_MOST = 40_000  # of a long log: with more, every second one is left out, and again
 EVALUATED = (

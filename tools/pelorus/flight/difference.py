@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from pelorus.flight.log import Frame
-from pelorus.frames import Pose, Report
-from pelorus.layout import Floats
+from pelorus.wire.frames import Pose, Report
+from pelorus.wire.layout import Floats
 
 POSE_WORDS = {
     "t_ns": "time",

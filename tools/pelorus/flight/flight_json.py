@@ -10,7 +10,7 @@ from typing import Any
 from pelorus.flight.difference import Difference
 from pelorus.flight.judge import Judgement, of_this_version, verdict_of
 from pelorus.flight.log import NOWHERE, RobotLog
-from pelorus.frames import Config
+from pelorus.wire.frames import Config
 
 
 def of(log: RobotLog, judgements: Sequence[Judgement]) -> dict[str, Any]:

@@ -12,9 +12,9 @@ from pelorus import ARITHMETIC, __version__
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, differ
 from pelorus.flight.log import NOWHERE, Frame, Loss, Part, RobotLog, frames_of
-from pelorus.frames import Config, Header
-from pelorus.replay import Programs, replayed
-from pelorus.settings import describe
+from pelorus.native.replay import Programs, replayed
+from pelorus.wire.frames import Config, Header
+from pelorus.wire.settings import describe
 
 FNV_OFFSET, FNV_PRIME = 2166136261, 16777619
 WITH_ALL_ROOMS = 3  # PLR_SUPERVISE and PLR_KNOWN_MAP

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from pelorus.errors import PelorusError
-from pelorus.frames import (
+from pelorus.robot.stream import is_restore
+from pelorus.wire.frames import (
     Config,
     End,
     Header,
@@ -32,11 +33,10 @@ from pelorus.frames import (
     Stereo,
     Text,
 )
-from pelorus.message import DATA_KINDS
-from pelorus.robot.stream import is_restore
-from pelorus.schema import STATUSES, number
-from pelorus.settings import IDS, mode_in_force
-from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
+from pelorus.wire.framing import SEQUENCE_MODULUS, Received, header_of, read_file
+from pelorus.wire.message import DATA_KINDS
+from pelorus.wire.schema import STATUSES, number
+from pelorus.wire.settings import IDS, mode_in_force
 
 # Statuses of data that were damaged on the way.
 NOT_ARRIVED = tuple(number("status", name) for name in ("ARGUMENT", "CORRUPT", "FOREIGN"))

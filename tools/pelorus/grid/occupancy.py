@@ -24,14 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, ndtr
 
-from pelorus.console import progress
 from pelorus.errors import PelorusError
-from pelorus.frames import BodyAxes
 from pelorus.grid import plane
 from pelorus.grid.plane import Plane
 from pelorus.grid.sightings import Sightings
-from pelorus.layout import Floats
-from pelorus.tracks import Indices
+from pelorus.io.tracks import Indices
+from pelorus.program.console import progress
+from pelorus.wire.frames import BodyAxes
+from pelorus.wire.layout import Floats
 
 FREE, FREE_MOST = 0.45, 2.0
 OCCUPIED = 8.0

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from pelorus.grid import files
 from pelorus.grid.occupancy import Grid
-from pelorus.style import BLACK, BLUE, DPI, PURPLE, panel
+from pelorus.program.style import BLACK, BLUE, DPI, PURPLE, panel
 
 UNKNOWN, FREE = "#C4C9CE", "#FFFFFF"
 WIDTH_IN, LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 12.0, 0.8, 0.2, 0.65, 0.85

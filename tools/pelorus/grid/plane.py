@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus.frames import BodyAxes
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import BodyAxes
+from pelorus.wire.layout import Floats
 
 AXES = "xyz"
 # The axes to the right and up of a picture whose viewer looks down on the axis named: right x up

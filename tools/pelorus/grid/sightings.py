@@ -10,13 +10,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
 from pelorus.errors import PelorusError
-from pelorus.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
-from pelorus.layout import Floats, unpack_symmetric
-from pelorus.motion import Times
-from pelorus.se3 import Poses
-from pelorus.tracks import Indices
+from pelorus.io.tracks import Indices
+from pelorus.math import se3
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
+from pelorus.wire.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
+from pelorus.wire.layout import Floats, unpack_symmetric
 
 # no point is known better: frames round, and the corner of a house is no point
 SIGMA_LEAST_M = 0.01

@@ -14,11 +14,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from pelorus.extras import extra
 from pelorus.live.clock import OtherClock
 from pelorus.live.frd import fields
 from pelorus.live.port import Port
 from pelorus.online.odometry import Odom
+from pelorus.program.extras import extra
 
 COMPONENT = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY
 HEARTBEAT_NS = 1_000_000_000

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from pelorus.errors import PelorusError
-from pelorus.layout import Floats
 from pelorus.online.order import Datum
 from pelorus.rig.read import Calibrated
 from pelorus.tracking.images import Gray
+from pelorus.wire.layout import Floats
 
 
 class Picture(NamedTuple):

@@ -11,8 +11,8 @@ import numpy as np
 
 from pelorus.converters import euroc, streams
 from pelorus.errors import PelorusError
-from pelorus.frames import Imu
 from pelorus.live.camera import Asked, Measured, Picture
+from pelorus.wire.frames import Imu
 
 Entry = tuple[int, int, Measured]  # its time, and which of equal times comes first
 

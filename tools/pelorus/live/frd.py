@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus.frames import UNKNOWN_VARIANCE
-from pelorus.layout import Floats
 from pelorus.online.drive import UNKNOWN_COVARIANCE
 from pelorus.online.odometry import Odom
+from pelorus.wire.frames import UNKNOWN_VARIANCE
+from pelorus.wire.layout import Floats
 
 M = np.diag([1.0, -1.0, -1.0])
 BOTH = np.kron(np.eye(2), M)

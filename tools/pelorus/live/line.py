@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pelorus import schema
 from pelorus.online.diagnosis import Status
 from pelorus.online.odometry import Odom
+from pelorus.wire import schema
 
 RATE_OVER_NS = 2_000_000_000
 NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")

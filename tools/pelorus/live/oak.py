@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.extras import extra
+from pelorus.io.named import Named
 from pelorus.live import factory
 from pelorus.live.camera import Asked, Force, Measured, Picture, Rate
-from pelorus.named import Named
+from pelorus.program.extras import extra
 from pelorus.rig import depthai as eeprom
 from pelorus.rig.rig import Rig
 

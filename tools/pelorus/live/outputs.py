@@ -7,11 +7,11 @@ import json
 import socket
 from typing import Protocol
 
-from pelorus import schema
 from pelorus.errors import PelorusError
-from pelorus.health import reasons
-from pelorus.layout import Floats
+from pelorus.evaluate.health import reasons
 from pelorus.online.odometry import Odom, turned
+from pelorus.wire import schema
+from pelorus.wire.layout import Floats
 
 
 class Output(Protocol):

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pelorus.errors import PelorusError
-from pelorus.frames import Config, Imu, Process, Reading, Stereo, Twist
 from pelorus.live.camera import Asked, Measured
 from pelorus.rig.read import Calibrated
-from pelorus.settings import IDS
-from pelorus.wire import header_of_messages, messages_of
+from pelorus.wire.frames import Config, Imu, Process, Reading, Stereo, Twist
+from pelorus.wire.framing import header_of_messages, messages_of
+from pelorus.wire.settings import IDS
 
 NAMES = {number: name for name, number in IDS.items()}
 

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.extras import extra
 from pelorus.live import factory
 from pelorus.live.camera import Asked, Force, Measured, Picture, Rate
+from pelorus.math.se3 import Poses
+from pelorus.program.extras import extra
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
 
 SIZE, RATE_HZ = (640, 480), 30
 WHERE = Path("the RealSense")

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import se3
-from pelorus.configured import Named
-from pelorus.frames import Header, Imu, Message, Stereo
 from pelorus.live.camera import Camera, Force, Measured, Picture, Rate
-from pelorus.native import Precision
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.native.binding import Precision
+from pelorus.native.configured import Named
 from pelorus.online import diagnosis
 from pelorus.online.diagnosis import Level, Status
 from pelorus.online.drive import Setup
 from pelorus.online.eyes import Seen
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline, header_of
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Header, Imu, Message, Stereo
 
 REMEDY_FOR_G = f"multiply its readings by {G_MPS2:g}"
 # From axes forward, left, up at the left camera to its own: right, down, ahead.

@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.extras import cv2
-from pelorus.frames import Imu
-from pelorus.layout import Floats
 from pelorus.live import factory
 from pelorus.live.camera import Asked, Measured, Picture
 from pelorus.live.clock import OtherClock
 from pelorus.live.port import Wire
+from pelorus.program.extras import cv2
 from pelorus.rig.rig import Rig
+from pelorus.wire.frames import Imu
+from pelorus.wire.layout import Floats
 
 SIZE, RATE_HZ, BAUD = (640, 480), 30, 115200
 LINE_BYTES_MAX = 400

@@ -16,13 +16,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from pelorus import foreign
 from pelorus.converters import wheels
 from pelorus.errors import PelorusError
-from pelorus.frames import Reading
+from pelorus.io import foreign
 from pelorus.live.camera import Camera, Measured
 from pelorus.live.session import on_camera
 from pelorus.online.pipeline import header_of
+from pelorus.wire.frames import Reading
 
 BYTES_MAX = 1000
 EXPECTED = "v_mps, or left_mps and right_mps, with t_ns or t_s if it has a stamp,"

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pelorus import schema
-from pelorus.health import DEGRADED, GOOD, HARMLESS, SHORT
+from pelorus.evaluate.health import DEGRADED, GOOD, HARMLESS, SHORT
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.pairs import Pairing
 from pelorus.online.together import Together
+from pelorus.wire import schema
 
 MISSED_SHARE = 0.1  # of the pictures may lack their partner before it is told
 LATE_SHARE = 0.02

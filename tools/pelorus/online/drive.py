@@ -14,10 +14,14 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
-from pelorus import packed_file, schema
-from pelorus.configured import Configured, Named
 from pelorus.filter import Filter, FilterError, observations
-from pelorus.frames import (
+from pelorus.math.se3 import Poses
+from pelorus.native.binding import Precision, library
+from pelorus.native.binding import Report as FrameReport
+from pelorus.native.configured import Configured, Named
+from pelorus.online.order import Datum
+from pelorus.wire import packed_file, schema
+from pelorus.wire.frames import (
     UNKNOWN_VARIANCE,
     Config,
     Header,
@@ -33,13 +37,9 @@ from pelorus.frames import (
     Stereo,
     Twist,
 )
-from pelorus.layout import Floats, pack_symmetric, unpack_symmetric
-from pelorus.native import Precision, library
-from pelorus.native import Report as FrameReport
-from pelorus.online.order import Datum
-from pelorus.se3 import Poses
-from pelorus.settings import IDS
-from pelorus.wire import Writer
+from pelorus.wire.framing import Writer
+from pelorus.wire.layout import Floats, pack_symmetric, unpack_symmetric
+from pelorus.wire.settings import IDS
 
 SENSOR_NAMES = {number: name for name, number in schema.SENSORS.items()}
 DIVERGED = schema.number("status", "DIVERGED")

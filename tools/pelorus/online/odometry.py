@@ -20,15 +20,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import packed_file, se3
 from pelorus.errors import PelorusError
+from pelorus.evaluate.health import LOST
 from pelorus.filter import FilterError
-from pelorus.frames import Message, Process, Start, StartFlag, Stereo
-from pelorus.health import LOST
-from pelorus.layout import Floats, pack_symmetric
+from pelorus.math import se3
+from pelorus.math.se3 import IDENTITY, Poses
 from pelorus.online.drive import UNKNOWN_COVARIANCE, Drive, Estimate, Setup
 from pelorus.online.order import ClockStep, Datum, Sequencer
-from pelorus.se3 import IDENTITY, Poses
+from pelorus.wire import packed_file
+from pelorus.wire.frames import Message, Process, Start, StartFlag, Stereo
+from pelorus.wire.layout import Floats, pack_symmetric
 
 PATIENCE_NS = 500_000_000  # a sensor that is this late is taken for dead, until it comes again
 SILENCE_NS = 100_000_000  # without frames the readings alone tell the pose, this often

@@ -13,7 +13,7 @@ import heapq
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from pelorus.frames import Imu, Reading, Stereo, Twist
+from pelorus.wire.frames import Imu, Reading, Stereo, Twist
 
 Datum = Imu | Twist | Reading | Stereo
 

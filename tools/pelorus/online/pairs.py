@@ -10,8 +10,8 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from pelorus.frames import Imu
-from pelorus.layout import Floats
+from pelorus.wire.frames import Imu
+from pelorus.wire.layout import Floats
 
 Item = TypeVar("Item")
 

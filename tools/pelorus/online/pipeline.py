@@ -15,10 +15,9 @@ import numpy as np
 
 from pelorus.converters.streams import FORCES_MPS2
 from pelorus.errors import PelorusError
+from pelorus.evaluate.health import DEGRADED, LOST
 from pelorus.faults.sync import PictureDelay
-from pelorus.frames import Header, Imu, Process, Stereo
-from pelorus.health import DEGRADED, LOST
-from pelorus.inertial import Inertial
+from pelorus.math.inertial import Inertial
 from pelorus.online.eyes import Eyes, Seen, open_eyes, require_size
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.order import Datum
@@ -26,6 +25,7 @@ from pelorus.online.pairs import Joining, Pairing
 from pelorus.online.together import Together
 from pelorus.rig.read import Calibrated
 from pelorus.tracking.images import Gray
+from pelorus.wire.frames import Header, Imu, Process, Stereo
 
 WINDOW = 50  # readings by whose median the unit is judged
 WINDOWS_ENOUGH = 4

@@ -8,9 +8,9 @@ from collections import deque
 import numpy as np
 
 from pelorus.faults.sync import PictureDelay, apart
-from pelorus.frames import Camera
+from pelorus.io.tracks import Tracks
 from pelorus.online.eyes import Seen
-from pelorus.tracks import Tracks
+from pelorus.wire.frames import Camera
 
 FRAMES, EVERY = 40, 20  # looked at together, and so often
 

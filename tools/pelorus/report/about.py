@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pelorus.calibrated import last_calibrated
-from pelorus.frames import Config, Header, Message, Text
 from pelorus.report.page import PageTable
 from pelorus.report.words import NONE
-from pelorus.schema import DEFAULTS
-from pelorus.settings import describe
+from pelorus.wire.calibrated import last_calibrated
+from pelorus.wire.frames import Config, Header, Message, Text
+from pelorus.wire.schema import DEFAULTS
+from pelorus.wire.settings import describe
 
 SEVERITIES = ("", "warning", "error")
 

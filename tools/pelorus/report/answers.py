@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from pelorus.check.verdict import NOISES, Verdict
 from pelorus.explain.explanation import Episode, Explanation
 from pelorus.explain.log import log_of
-from pelorus.frames import Message
 from pelorus.report.about import tables_of
 from pelorus.report.footage import CAPTION, Footage
 from pelorus.report.page import Answer, Event, PageTable
 from pelorus.report.spectra import drawings
+from pelorus.wire.frames import Message
 
 if TYPE_CHECKING:
     from pelorus.check.checked import Checked

@@ -7,14 +7,14 @@ import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from pelorus.evaluation import Accuracy
+from pelorus.evaluate.evaluation import Accuracy
+from pelorus.evaluate.relative_error import Drift, drifts
 from pelorus.explain.explanation import Explanation
-from pelorus.frames import Config, Message
-from pelorus.relative_error import Drift, drifts
 from pelorus.report.curves import BESIDE
 from pelorus.report.page import PageTable
 from pelorus.report.words import NONE, number
-from pelorus.settings import describe
+from pelorus.wire.frames import Config, Message
+from pelorus.wire.settings import describe
 
 DRIFT = (
     "How far a piece of the way of that length is off, wherever it begins, first poses aligned: "

@@ -24,14 +24,14 @@ from typing import NamedTuple
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.evaluation import Accuracy, assess, by_imu, on_its_clock
-from pelorus.frames import Kind, Landmark, Message, Report, Role, Stereo
+from pelorus.evaluate.evaluation import Accuracy, assess, by_imu, on_its_clock
 from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import sightings
-from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.math.motion import Times
 from pelorus.report.results import OWN, Run, Subject
-from pelorus.settings import in_force
+from pelorus.wire.frames import Kind, Landmark, Message, Report, Role, Stereo
+from pelorus.wire.layout import Floats
+from pelorus.wire.settings import in_force
 
 DIAGONAL = (0, 2, 5)  # of a packed 3 x 3
 PRIOR_VARIANCE_M2 = 2.0  # Sigma_m of the report, an axis

@@ -16,20 +16,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from pelorus import schema
-from pelorus.ellipsoids import ellipsoids
-from pelorus.evaluation import Accuracy, assess, by_imu, on_its_clock
-from pelorus.evidence import Evidence
-from pelorus.frame_table import FrameTable, frame_table
-from pelorus.frames import Message, Truth, TruthKnows
+from pelorus.evaluate.evaluation import Accuracy, assess, by_imu, on_its_clock
+from pelorus.evaluate.frame_table import FrameTable, frame_table
+from pelorus.evaluate.health import GOOD, NOT_STARTED, SHORT
 from pelorus.grid.plane import AXES, choose
-from pelorus.health import GOOD, NOT_STARTED, SHORT
-from pelorus.layout import Floats, stacked
-from pelorus.motion import Times, nearest
+from pelorus.io.trajectory import POSE_SIZE, Trajectory, estimate_in, truth_in
+from pelorus.math.ellipsoids import ellipsoids
+from pelorus.math.motion import Times, nearest
 from pelorus.report.landmarks import WHY, Landmarks, packed
 from pelorus.report.packed import Packer
-from pelorus.trajectory import POSE_SIZE, Trajectory, estimate_in, truth_in
-from pelorus.wire import header_of_messages
+from pelorus.wire import schema
+from pelorus.wire.evidence import Evidence
+from pelorus.wire.frames import Message, Truth, TruthKnows
+from pelorus.wire.framing import header_of_messages
+from pelorus.wire.layout import Floats, stacked
 
 SIGMAS = 3.0
 BAND = 0.95

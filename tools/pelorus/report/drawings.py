@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from pelorus.layout import Floats
+from pelorus.wire.layout import Floats
 
 WIDTH, HEIGHT, LEFT, BOTTOM, TOP, RIGHT = 560, 240, 58, 34, 10, 10
 TICKS = 5

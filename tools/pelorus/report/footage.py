@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from pelorus.errors import PelorusError
 from pelorus.explain.explanation import Explanation
 from pelorus.explain.log import FilterLog, log_of
-from pelorus.extras import extra
-from pelorus.frames import Message
-from pelorus.motion import Times, nearest
+from pelorus.math.motion import Times, nearest
+from pelorus.program.extras import extra
 from pelorus.report.residuals import residuals_of
 from pelorus.tracking import images
 from pelorus.tracking.images import Gray
+from pelorus.wire.frames import Message
 
 if TYPE_CHECKING:
     from PIL import ImageDraw

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pelorus.ellipsoids import Ellipsoids, of_landmarks
-from pelorus.evaluation import made_in, sigmas_m
-from pelorus.evidence import Evidence
-from pelorus.frames import Message, Stereo
-from pelorus.layout import Floats
+from pelorus.evaluate.evaluation import made_in, sigmas_m
+from pelorus.io.trajectory import Trajectory
+from pelorus.math.ellipsoids import Ellipsoids, of_landmarks
 from pelorus.report.packed import Packer
-from pelorus.trajectory import Trajectory
+from pelorus.wire.evidence import Evidence
+from pelorus.wire.frames import Message, Stereo
+from pelorus.wire.layout import Floats
 
 LANDMARKS_MOST = 20_000
 REJECTIONS_MOST = 60_000

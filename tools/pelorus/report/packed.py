@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pelorus.layout import Floats
+from pelorus.wire.layout import Floats
 
 STEPS = 65534  # between least and largest; 0 is unknown
 

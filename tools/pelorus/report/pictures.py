@@ -17,11 +17,7 @@ from matplotlib.figure import Figure
 
 from pelorus.grid import picture
 from pelorus.grid.files import heights
-from pelorus.layout import Floats
-from pelorus.report import top_view
-from pelorus.report.comparison import COURSE, Comparison
-from pelorus.report.results import OWN, Run
-from pelorus.style import (
+from pelorus.program.style import (
     BLACK,
     DPI,
     GREY,
@@ -34,6 +30,10 @@ from pelorus.style import (
     new_figure,
     panel,
 )
+from pelorus.report import top_view
+from pelorus.report.comparison import COURSE, Comparison
+from pelorus.report.results import OWN, Run
+from pelorus.wire.layout import Floats
 
 CURVE_MIN = 2  # frames: one point is no curve
 

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
 from pelorus.explain.log import FilterLog
-from pelorus.layout import Floats
-from pelorus.se3 import Poses
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
+from pelorus.wire.layout import Floats
 
 BEFORE = 10  # frames
 SEEN_LEAST = 3  # views among them

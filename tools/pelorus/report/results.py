@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.evaluation import judge, known_in, made_in, sigmas_m
-from pelorus.frame_table import FrameTable, frame_table
-from pelorus.frames import Header, Landmark, Message, Process
-from pelorus.health import TimeLine, time_line
-from pelorus.layout import Floats
-from pelorus.replay import Outputs, Programs, depth_limit_m, replay
-from pelorus.trajectory import Trajectory, estimate_in, truth_in
+from pelorus.evaluate.evaluation import judge, known_in, made_in, sigmas_m
+from pelorus.evaluate.frame_table import FrameTable, frame_table
+from pelorus.evaluate.health import TimeLine, time_line
+from pelorus.io.trajectory import Trajectory, estimate_in, truth_in
+from pelorus.native.replay import Outputs, Programs, depth_limit_m, replay
+from pelorus.wire import framing
+from pelorus.wire.frames import Header, Landmark, Message, Process
+from pelorus.wire.layout import Floats
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Subject:
 
 def read_subject(path: Path) -> Subject:
     """Reads a recording; raises PelorusError where there is nothing to report on."""
-    messages = wire.messages_of(path)
+    messages = framing.messages_of(path)
     header = next(m for m in messages if isinstance(m, Header))
     return Subject(path, header, truth_in(messages), known_in(messages))
 
@@ -109,7 +109,7 @@ class Run:
     """A finished run.
 
     `trajectory` and the pose covariance (n, 6, 6) are after each frame; `summary` is the program's,
-    with the figures of `pelorus.evaluation`.
+    with the figures of `pelorus.evaluate.evaluation`.
     """
 
     plan: Plan
@@ -145,7 +145,7 @@ def carry_out(plan: Plan, subject: Subject, folder: Path) -> Run:
     """Replays the recording as planned, leaves the files in the folder, and reads them."""
     outputs = Outputs.named(folder, plan.name)
     summary, said = replay(plan.program, subject.path, plan.options, outputs)
-    messages = wire.messages_of(outputs.log)
+    messages = framing.messages_of(outputs.log)
     found = estimate_in(messages)
     if found is None:
         raise PelorusError(f"{outputs.log}: holds no pose after a stereo frame")

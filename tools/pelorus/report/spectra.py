@@ -9,10 +9,10 @@ import numpy as np
 from scipy.signal import welch
 
 from pelorus.explain.log import FilterLog
-from pelorus.layout import Floats
 from pelorus.report.drawings import arrows, plot
 from pelorus.report.page import Drawing
 from pelorus.report.residuals import Residuals, residuals
+from pelorus.wire.layout import Floats
 
 SEGMENT = 1024  # readings of a spectrum
 LEAST = 64

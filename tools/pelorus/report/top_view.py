@@ -10,13 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pelorus import se3
 from pelorus.grid import plane
 from pelorus.grid.plane import Plane
-from pelorus.layout import Floats
+from pelorus.math import se3
+from pelorus.program.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 from pelorus.report.comparison import Comparison
 from pelorus.report.results import OWN
-from pelorus.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
+from pelorus.wire.layout import Floats
 
 MARGIN = 0.15  # of the larger side
 STRAY = 0.75  # share of the larger side by which another run may widen the picture

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from pelorus import schema
-from pelorus.frames import Header
 from pelorus.report.comparison import Comparison
 from pelorus.report.results import Run
+from pelorus.wire import schema
+from pelorus.wire.frames import Header
 
 NONE = "-"
 POSE = ("err0 m", "ATE m", "rotation deg", "NEES/6")

@@ -12,16 +12,16 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import se3
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Noise
-from pelorus.layout import Floats
-from pelorus.named import Named
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig import several
 from pelorus.rig.imu_model import Correction, ImuModel
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Noise
+from pelorus.wire.layout import Floats
 
 # Names of the parameters after fx, fy, cx, cy.
 LENSES: dict[str, tuple[LensModel, tuple[str, ...]]] = {

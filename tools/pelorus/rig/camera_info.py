@@ -13,14 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import se3
-from pelorus.foreign import ForeignFileError
-from pelorus.layout import Floats
-from pelorus.named import Named
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig.kalibr import matrix
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
+from pelorus.wire.layout import Floats
 
 LENSES = {
     "plumb_bob": LensModel.RADTAN,

@@ -14,15 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from pelorus import arrays, se3
-from pelorus.foreign import ForeignFileError
-from pelorus.layout import Floats
-from pelorus.named import Named
+from pelorus.io import arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig import several
 from pelorus.rig.kalibr import matrix
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
+from pelorus.wire.layout import Floats
 
 CM = 1e-2
 NO_SOCKET = -1

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pelorus.frames import Noise
-from pelorus.inertial import Inertial
-from pelorus.layout import Floats
+from pelorus.math.inertial import Inertial
+from pelorus.wire.frames import Noise
+from pelorus.wire.layout import Floats
 
 
 @dataclass(frozen=True)

@@ -17,16 +17,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from pelorus import arrays, se3
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Noise
-from pelorus.layout import Floats
-from pelorus.named import Named, as_numbers, sane
+from pelorus.io import arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named, as_numbers, sane
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig import several, spheres
 from pelorus.rig.imu_model import Correction, ImuModel
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig, rigid
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Noise
+from pelorus.wire.layout import Floats
 
 LENSES = {
     "none": LensModel.NONE,

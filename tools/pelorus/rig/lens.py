@@ -15,9 +15,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from pelorus.extras import cv2
-from pelorus.layout import Floats
+from pelorus.program.extras import cv2
 from pelorus.rig import spheres
+from pelorus.wire.layout import Floats
 
 
 class LensModel(StrEnum):

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pelorus import se3
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Noise
-from pelorus.named import Named, as_numbers
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named, as_numbers
+from pelorus.math import se3
 from pelorus.rig import several
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.kalibr import pose
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig
+from pelorus.wire.frames import Noise
 
 LENSES = {
     "none": LensModel.NONE,

@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from pelorus import arrays, se3
-from pelorus.foreign import ForeignFileError
-from pelorus.named import Named
+from pelorus.io import arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig.kalibr import matrix
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
 
 # Names of the matrix of camera {} and of its lens; and what {} may be for the two.
 MATRICES = ("K{}", "M{}", "CM{}", "cameraMatrix{}", "CameraMatrix{}", "camera_matrix{}")

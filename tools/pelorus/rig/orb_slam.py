@@ -14,16 +14,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from pelorus import se3
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Noise
-from pelorus.named import Named
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.kalibr import matrix, pose
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Noise
 
 NOISE = {
     "gyro_noise": "IMU.NoiseGyro",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Reads calibrations of every kind, which their contents tell apart.
 
-JSON of a rectified pair is the project's own (pelorus.calibration); KINDS lists those of others.
+JSON of a rectified pair is the project's own (`calibration`); KINDS lists those of others.
 Kalibr's file of an IMU may accompany any of them.
 """
 
@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from pelorus import calibration, foreign
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Camera, Header, header_name
-from pelorus.named import Named
+from pelorus.io import foreign
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
 from pelorus.rig import (
     basalt,
+    calibration,
     camera_info,
     depthai,
     kalibr,
@@ -32,6 +32,7 @@ from pelorus.rig import (
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.lens import LensModel
 from pelorus.rig.rig import Rig
+from pelorus.wire.frames import Camera, Header, header_name
 
 SECTION = re.compile(r"\[\w+\]\s*$")
 

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.extras import cv2
-from pelorus.frames import Camera
-from pelorus.layout import Floats
+from pelorus.math.se3 import Poses
+from pelorus.program.extras import cv2
 from pelorus.rig.lens import Lens
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Camera
+from pelorus.wire.layout import Floats
 
 Gray = NDArray[np.uint8]
 

@@ -8,17 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import arrays, se3
 from pelorus.errors import PelorusError
-from pelorus.faults.axes import body_axes
-from pelorus.foreign import ForeignFileError
-from pelorus.frames import Camera, Header, header_name
-from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.io import arrays
+from pelorus.io.foreign import ForeignFileError
+from pelorus.math import se3
+from pelorus.math.axes import body_axes
+from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rectification import Rectification, Side
-from pelorus.se3 import Poses
+from pelorus.wire.frames import Camera, Header, header_name
+from pelorus.wire.layout import Floats
 
 SAME = 1e-9  # a smaller error counts as rectified
 

@@ -15,11 +15,11 @@ from math import cos, radians
 from pathlib import Path
 from typing import NamedTuple
 
-from pelorus import se3
-from pelorus.foreign import ForeignFileError
+from pelorus.io.foreign import ForeignFileError
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.rig.lens import Lens
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
 
 SAME_FOCAL = 0.05  # relative difference of two cameras of one kind
 APART_MAX_RAD = radians(30.0)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pelorus.layout import Floats
+from pelorus.wire.layout import Floats
 
 PARAMETERS = {"omni": 1, "eucm": 2, "ds": 2}  # before those of the distortion
 

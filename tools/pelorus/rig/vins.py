@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pelorus import foreign, se3
-from pelorus.foreign import ForeignFileError
-from pelorus.named import Named
+from pelorus.io import foreign
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.math import se3
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.kalibr import pose
 from pelorus.rig.lens import Lens, LensModel

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus.foreign import ForeignFileError
-from pelorus.named import Named
+from pelorus.io.foreign import ForeignFileError
+from pelorus.io.named import Named
+from pelorus.math.se3 import Poses
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
 
 SIZES = {
     "2k": (2208, 1242),

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import BinaryIO
 
 from pelorus.errors import PelorusError
-from pelorus.frames import Config, End, Kind, Message, Report
-from pelorus.wire import Writer
+from pelorus.wire.frames import Config, End, Kind, Message, Report
+from pelorus.wire.framing import Writer
 
 SETUP_KINDS = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK, Kind.START)
 

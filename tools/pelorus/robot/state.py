@@ -6,8 +6,18 @@ from __future__ import annotations
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.frames import Imu, Kind, Message, Reading, State, StateAction, Stereo, Truth, Twist
-from pelorus.layout import Floats
+from pelorus.wire.frames import (
+    Imu,
+    Kind,
+    Message,
+    Reading,
+    State,
+    StateAction,
+    Stereo,
+    Truth,
+    Twist,
+)
+from pelorus.wire.layout import Floats
 
 Data = Twist | Imu | Reading | Truth | Stereo
 

@@ -6,8 +6,8 @@ They are defined in include/pelorus/types.h.
 
 from __future__ import annotations
 
-from pelorus.frames import Kind
-from pelorus.schema import HEALTHS, REASONS, STATUSES
+from pelorus.wire.frames import Kind
+from pelorus.wire.schema import HEALTHS, REASONS, STATUSES
 
 
 def condition(health: int, reasons: int) -> str:

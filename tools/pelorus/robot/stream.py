@@ -17,7 +17,10 @@ from typing import BinaryIO
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.frames import (
+from pelorus.robot.flight_log import SETUP_KINDS, FlightLog
+from pelorus.robot.link import Link
+from pelorus.robot.status import refusal
+from pelorus.wire.frames import (
     Config,
     End,
     Header,
@@ -35,11 +38,8 @@ from pelorus.frames import (
     Stereo,
     Text,
 )
-from pelorus.robot.flight_log import SETUP_KINDS, FlightLog
-from pelorus.robot.link import Link
-from pelorus.robot.status import refusal
-from pelorus.settings import IDS
-from pelorus.wire import DELIMITER, Counts, Reader, encode, end_of
+from pelorus.wire.framing import DELIMITER, Counts, Reader, encode, end_of
+from pelorus.wire.settings import IDS
 
 ANSWER_S = 5.0  # a slow emulated board on a busy machine takes tenths
 QUIET_S = 0.3

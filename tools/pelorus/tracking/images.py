@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import arrays, foreign, motion
 from pelorus.errors import PelorusError, resolved
-from pelorus.extras import extra
-from pelorus.foreign import ForeignFileError
-from pelorus.motion import Times
+from pelorus.io import arrays, foreign
+from pelorus.io.foreign import ForeignFileError
+from pelorus.math import motion
+from pelorus.math.motion import Times
+from pelorus.program.extras import extra
 
 Gray = NDArray[np.uint8]
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.extras import cv2
+from pelorus.program.extras import cv2
 from pelorus.tracking.images import Gray
 from pelorus.tracking.settings import Settings
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from pelorus.errors import whole, writing
-from pelorus.motion import Times
-from pelorus.tracks import Tracks
+from pelorus.io.tracks import Tracks
+from pelorus.math.motion import Times
 
 COLUMNS = "t_ns,id,uL_px,vL_px,uR_px,vR_px"
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.extras import cv2
+from pelorus.program.extras import cv2
 from pelorus.tracking import matching
 from pelorus.tracking.images import Gray
 from pelorus.tracking.settings import Settings

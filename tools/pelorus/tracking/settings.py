@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pelorus.errors import PelorusError
-from pelorus.frames import OBSERVATIONS_MAX
+from pelorus.wire.frames import OBSERVATIONS_MAX
 
 
 @dataclass(frozen=True)

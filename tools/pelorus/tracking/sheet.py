@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
-from pelorus.extras import cv2
+from pelorus.io.tracks import Tracks
+from pelorus.program.extras import cv2
 from pelorus.tracking.images import Gray
-from pelorus.tracks import Tracks
 
 Picture = NDArray[np.uint8]
 

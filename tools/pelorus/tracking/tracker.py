@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
-from pelorus.layout import Floats
+from pelorus.io.tracks import Tracks
 from pelorus.tracking import matching, patches
 from pelorus.tracking.images import PAIRS_MIN, Gray
 from pelorus.tracking.matching import Mask, Points
 from pelorus.tracking.patches import Patches
 from pelorus.tracking.rectified import Evidence
 from pelorus.tracking.settings import Settings
-from pelorus.tracks import Tracks
+from pelorus.wire.layout import Floats
 
 ADMITTED_AFTER = PAIRS_MIN  # frames
 LOOP_PX = 1.0  # flow in the right picture and the match from the left one must meet

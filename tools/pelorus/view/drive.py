@@ -15,17 +15,17 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import schema
-from pelorus.distribution import pip_install
-from pelorus.ellipsoids import Ellipsoids, of_landmarks
 from pelorus.errors import PelorusError
-from pelorus.evaluation import assess, by_imu, on_its_clock
-from pelorus.evidence import Evidence
-from pelorus.frame_table import DIAGONAL
-from pelorus.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Stereo
-from pelorus.health import reasons
-from pelorus.layout import Floats
-from pelorus.trajectory import estimate_in, is_finite, truth_in
+from pelorus.evaluate.evaluation import assess, by_imu, on_its_clock
+from pelorus.evaluate.frame_table import DIAGONAL
+from pelorus.evaluate.health import reasons
+from pelorus.io.trajectory import estimate_in, is_finite, truth_in
+from pelorus.math.ellipsoids import Ellipsoids, of_landmarks
+from pelorus.program.distribution import pip_install
+from pelorus.wire import schema
+from pelorus.wire.evidence import Evidence
+from pelorus.wire.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Stereo
+from pelorus.wire.layout import Floats
 
 COUNTS = ("observations", "matched", "used", "gated", "created", "active")  # of REPORT
 TWIST = tuple(f"{kind} {axis}" for kind in ("linear", "turn") for axis in "xyz")

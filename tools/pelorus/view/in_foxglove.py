@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from pelorus.ellipsoids import Ellipsoids, of_pose
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Landmark, Pose
-from pelorus.layout import Floats, unpack_symmetric
+from pelorus.math.ellipsoids import Ellipsoids, of_pose
 from pelorus.view.drive import Moment, extra, quaternion
+from pelorus.wire.frames import Header, Landmark, Pose
+from pelorus.wire.layout import Floats, unpack_symmetric
 
 S = 1_000_000_000
 WORLD, BODY, CAMERA = "world", "body", "camera"

@@ -19,11 +19,11 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from pelorus.ellipsoids import Ellipsoids, of_pose
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Landmark
-from pelorus.layout import Floats
+from pelorus.math.ellipsoids import Ellipsoids, of_pose
 from pelorus.view.drive import Moment, extra, quaternion
+from pelorus.wire.frames import Header, Landmark
+from pelorus.wire.layout import Floats
 
 S = 1_000_000_000
 PIECE_NS = 10 * S

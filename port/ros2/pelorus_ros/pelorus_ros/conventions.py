@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pelorus import se3
-from pelorus.layout import Floats
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.online.odometry import turned
-from pelorus.se3 import Poses
+from pelorus.wire.layout import Floats
 from scipy.spatial.transform import Rotation
 
 LANDMARK = np.dtype(

@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pelorus import schema
 from pelorus.converters import ros_frames
 from pelorus.errors import PelorusError, write_text
-from pelorus.frames import Imu, Reading, Twist
-from pelorus.known_map import known_map
-from pelorus.layout import Floats
+from pelorus.io.known_map import known_map
 from pelorus.online import diagnosis
 from pelorus.online.diagnosis import Status
 from pelorus.online.drive import Setup
 from pelorus.online.eyes import Seen
 from pelorus.online.odometry import Given, Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline
+from pelorus.wire import schema
+from pelorus.wire.frames import Imu, Reading, Twist
+from pelorus.wire.layout import Floats
 
 from pelorus_ros import conventions, status
 from pelorus_ros.mounting import NoChain, bare
@@ -242,15 +242,19 @@ class Estimator:
         return told
 
     def _beside(self, read: Wheels) -> list[Odom]:
-        """Wheels beside an IMU: their velocity in the IMU's axes, at the place of their frame."""
+        """Wheels beside an IMU: their velocities in the IMU's axes, where they are."""
         if not self._ready() or self.rigged is None:
             return []
         T = self.rigging.wheels_on_body(read.frame, self.rigged.T_IB)
         given = np.array(self.options.wheel_sigma_mps)
         sigma = np.where(read.sigma > 0, read.sigma, given)
-        inside = np.sqrt(np.diag(T.R @ np.diag(sigma**2) @ T.R.T))
         number = schema.SENSORS["wheel"]
-        return self.pipeline.add(Reading(read.t_ns, number, 7, T.R @ read.v_mps, inside, T.p))
+        told = []
+        for at, v, noise in _each_wheel(read, self.options.wheel_track_m, sigma):
+            inside = np.sqrt(np.diag(T.R @ np.diag(noise**2) @ T.R.T))
+            one = Reading(read.t_ns, number, 7, T.R @ v, inside, T.p + T.R @ at)
+            told += self.pipeline.add(one)
+        return told
 
     # --- what it takes to begin
 
@@ -346,3 +350,15 @@ class Estimator:
 
 def _row(vector: Any) -> Floats:
     return np.array([[vector.x, vector.y, vector.z]], np.float64)
+
+
+def _each_wheel(read: Wheels, track_m: float, sigma: Floats) -> list[tuple[Floats, Floats, Floats]]:
+    """Returns place, velocity and sigma (3,) of each wheel in their frame.
+
+    A velocity and a yaw rate were made of two wheels, so they tell those again; the velocity is the
+    mean of two, each of which has a variance twice as large. Without a track it is one place.
+    """
+    if not track_m:
+        return [(np.zeros(3), read.v_mps, sigma)]
+    sides = (np.array([0.0, y, 0.0]) for y in (track_m / 2, -track_m / 2))
+    return [(at, read.v_mps + np.cross(read.w_radps, at), np.sqrt(2) * sigma) for at in sides]

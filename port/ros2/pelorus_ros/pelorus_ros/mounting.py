@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from pelorus import se3
-from pelorus.se3 import IDENTITY, Poses
+from pelorus.math import se3
+from pelorus.math.se3 import IDENTITY, Poses
 
 from pelorus_ros.conventions import pose_of
 

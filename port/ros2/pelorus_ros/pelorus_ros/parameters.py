@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
 
-from pelorus.configured import Configured
 from pelorus.errors import PelorusError
-from pelorus.native import Precision, library
+from pelorus.native.binding import Precision, library
+from pelorus.native.configured import Configured
 
 MOTIONS = ("imu", "gyro_accel", "wheels")
 TRANSPORTS = ("raw", "compressed")
@@ -59,6 +59,11 @@ class Options:
         [0.05, 0.05, 0.05],
         "noise of the wheels' velocity beside an IMU along x, y, z of their frame, where the "
         "message gives no variance; y and z are how far the base slides and hops",
+    )
+    wheel_track_m: float = parameter(
+        0.0,
+        "beside an IMU: distance of the left and the right wheel, by which the odometry's yaw rate "
+        "was made; each wheel is then used by itself. 0: the yaw rate is not used",
     )
     tracks_type: str = parameter(
         "", "type of the topic tracks; empty: pictures are followed here", ("", *TRACKS)
@@ -141,6 +146,10 @@ class Options:
             raise PelorusError(
                 f"parameter sync_matching_threshold_ms: {self.sync_matching_threshold_ms}; "
                 "0 or more is possible"
+            )
+        if not 0 <= self.wheel_track_m < 100:
+            raise PelorusError(
+                f"parameter wheel_track_m: {self.wheel_track_m}; 0 to 100 m is possible"
             )
         if self.known_map and not self.tracks_type:
             raise PelorusError(

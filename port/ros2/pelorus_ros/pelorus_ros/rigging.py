@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from pelorus import se3
 from pelorus.errors import PelorusError
+from pelorus.math import se3
+from pelorus.math.se3 import IDENTITY, Poses
 from pelorus.online.pipeline import header_of
 from pelorus.rig import read as rig_files
 from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import Rig, rigid
-from pelorus.se3 import IDENTITY, Poses
 
 from pelorus_ros.mounting import Mounting, NoChain, bare
 from pelorus_ros.parameters import Options

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""Recordings with pictures: the replay's eyes see what `pelorus.Tracker` sees, to the bit."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from firmware import pictures
+from pelorus import Tracker
+from pelorus.math.se3 import Poses
+from pelorus.rig.lens import Lens, LensModel
+from pelorus.rig.rig import Rig
+from pelorus.tracker import MODELS
+from pelorus.wire import framing
+from pelorus.wire.frames import Config, Header, Message, Process, Stereo, Twist
+from pelorus.wire.image import Image, RigMessage, TimedPair, pairs_of
+from pelorus.wire.settings import IDS
+from replay_drive import run
+
+STANDS = np.eye(3), np.zeros(3)
+
+
+def standing(messages: list[Message]) -> Iterator[Message]:
+    """The pictures of a recording, with twists that say that the body stands, and no bias.
+
+    The motion that eyes expect is then none, which a test can tell the tracker, too.
+    """
+    header = next(m for m in messages if isinstance(m, Header))
+    yield replace(header, process=Process.TWIST)
+    yield from (m for m in messages if isinstance(m, RigMessage))
+    yield Config({IDS["bias"]: 0.0})
+    times: set[int] = set()
+    for m in messages:
+        if isinstance(m, Image):
+            if m.t_ns not in times:
+                yield Twist(m.t_ns)
+            times.add(m.t_ns)
+            yield m
+
+
+def tracker_of(messages: list[Message]) -> Tracker:
+    header = next(m for m in messages if isinstance(m, Header))
+    rig = next(m for m in messages if isinstance(m, RigMessage))
+    models = {number: model for model, number in MODELS.items()}
+
+    def lens(side: str) -> Lens:
+        four = (getattr(rig, f"{side}_{name}_px") for name in ("fx", "fy", "cx", "cy"))
+        model = models[getattr(rig, f"{side}_model")]
+        k = () if model is LensModel.NONE else tuple(getattr(rig, f"{side}_k").tolist())
+        return Lens(model, tuple(four), k, rig.width_px, rig.height_px)  # type: ignore[arg-type]
+
+    given = Rig(Path(), lens("left"), lens("right"), Poses(rig.R_RL, rig.t_RL_m))
+    return Tracker(given, tracks=rig.tracks or 400, camera=header.camera)
+
+
+def assert_the_same(messages: list[Message], folder: Path) -> None:
+    path, log = folder / "in.plr", folder / "log.plr"
+    framing.write_file(path, messages, len(messages))
+    run(path, "--out", log)
+    logged = [m for m in framing.messages_of(log) if isinstance(m, Stereo)]
+    pairs: list[TimedPair] = list(pairs_of(messages))
+    tracker = tracker_of(messages)
+    assert len(logged) == len(pairs) > 5
+    for pair, stereo in zip(pairs, logged, strict=True):
+        seen = tracker.track(
+            pair.t_ns, pair.left, pair.right, motion=STANDS, t_right_ns=pair.t_right_ns
+        )
+        assert len(stereo.ids) > 10
+        assert (seen.observations["id"] == stereo.ids).all()
+        assert seen.pixels.tobytes() == stereo.pixels.tobytes()
+
+
+def test_the_replay_sees_what_the_tracker_sees(tmp_path: Path) -> None:
+    drive = pictures.recording(160, 120, 32, 32)
+    assert_the_same(list(standing(list(drive.messages()))), tmp_path)
+
+
+def test_a_log_of_pictures_replays_without_them_to_the_same_bits(tmp_path: Path) -> None:
+    path, log, again = (tmp_path / name for name in ("in.plr", "log.plr", "again.plr"))
+    pictures.recording(160, 120, 32, 32).write(path)
+    run(path, "--out", log)
+    run(log, "--out", again)
+    assert log.stat().st_size < path.stat().st_size / 4
+    first, second = (
+        [m.pack() for m in framing.messages_of(name) if not isinstance(m, Config)]
+        for name in (log, again)
+    )
+    assert first == second
+
+
+@pytest.mark.parametrize(
+    ("format_", "folder"),
+    [("euroc", "images/euroc-mh01-start"), ("kitti", "images/kitti-06-start")],
+)
+def test_pictures_of_a_data_set_are_kept(
+    format_: str,
+    folder: str,
+    real: Callable[[str], Path],
+    pelorus: Callable[..., object],
+    tmp_path: Path,
+) -> None:
+    target = tmp_path / "drive.plr"
+    pelorus("convert", format_, real(folder), target, "--keep-pictures")
+    messages = framing.messages_of(target)
+    assert not any(isinstance(m, Stereo) for m in messages)
+    rig = [m for m in messages if isinstance(m, RigMessage)]
+    assert len(rig) == (format_ == "euroc")
+    if rig:  # real lenses
+        times = sorted({m.t_ns for m in messages if isinstance(m, Image)})[:8]
+        few = [m for m in messages if not isinstance(m, Image) or m.t_ns in times]
+        assert_the_same(list(standing(few)), tmp_path)
+    else:
+        assert len(list(itertools.islice(pairs_of(messages), 3))) == 3

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Runs an image that replays pictures on an emulated board, and the same recording at the desk.
+
+usage: python -m firmware.eyes BOARD IMAGE.elf RECORDING.plr PELORUS-REPLAY
+
+Prints instructions of each pair and what both saw; exit status 1 where one bit differs.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pelorus.errors import PelorusError
+from pelorus.robot.emulator import Emulator
+from pelorus.wire.frames import Pose, Stereo
+from pelorus.wire.framing import messages_of
+
+from firmware.sizes import BENCH_S, EMULATED_HZ, INSTRUCTIONS_PER_SECOND, fields
+
+ROW = np.dtype([("id", "<u4"), ("pixels", "<f4", 4), ("sigma", "<f4")])
+REFUSED = re.compile(r"^refused .*$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A pair of pictures: CRC of observations, and of pose and covariance."""
+
+    t_ns: int
+    seen: int
+    pose: int
+
+
+@dataclass(frozen=True)
+class Board:
+    """The result of an image."""
+
+    pairs: list[Pair]
+    look: list[float]  # instructions of eyes, a pair
+    update: list[float]  # of the filter
+    eyes_bytes: int
+    session_bytes: int
+    stack: int
+
+
+def on_board(board: str, image: Path) -> Board:
+    """Runs the image, an instruction a nanosecond."""
+    with Emulator(board, image, ("-icount", "shift=0")) as emulator:
+        link = emulator.connect()
+        text = b""
+        while not re.search(rb"done stack \d+ \n", text):
+            piece = link.exchange(b"", BENCH_S)
+            if not piece:
+                raise PelorusError(f"{image}: silent for {BENCH_S:.0f} s. {emulator.trouble()}")
+            text += piece
+        link.close()
+    if refused := REFUSED.search(text.decode()):
+        raise PelorusError(f"{image}: {refused[0]}")
+    first, *lines, last = text.decode().splitlines()
+    size = fields(first.removeprefix("size "))
+    per_clock = INSTRUCTIONS_PER_SECOND / EMULATED_HZ.get(board, size["hz"])
+    rows = [fields(line) for line in lines]
+    return Board(
+        [Pair(row["pair"], row["seen"], row["pose"]) for row in rows],
+        [row["look"] * per_clock for row in rows],
+        [row["update"] * per_clock for row in rows],
+        size["eyes"],
+        size["session"],
+        fields(last.removeprefix("done "))["stack"],
+    )
+
+
+def at_desk(program: Path, recording: Path) -> list[Pair]:
+    """Replays the recording, and reads its log."""
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log.plr"
+        subprocess.run([program, recording, "--out", log, "--quiet"], check=True)
+        messages = messages_of(log)
+    poses = {m.t_ns: m for m in messages if isinstance(m, Pose) and m.after_stereo}
+    return [
+        Pair(m.t_ns, zlib.crc32(_rows(m)), zlib.crc32(_numbers(poses[m.t_ns])))
+        for m in messages
+        if isinstance(m, Stereo)
+    ]
+
+
+def _rows(stereo: Stereo) -> bytes:
+    """Returns the observations as a plr_observation holds them."""
+    rows = np.zeros(len(stereo.ids), ROW)
+    rows["id"], rows["pixels"] = stereo.ids, stereo.pixels
+    if stereo.sigmas is not None:
+        rows["sigma"] = stereo.sigmas
+    return rows.tobytes()
+
+
+def _numbers(pose: Pose) -> bytes:
+    """Returns the pose and its covariance as doubles, as a plr_pose_message holds them."""
+    parts = (pose.R_WB, pose.p_WB_m, pose.covariance)
+    return b"".join(np.ascontiguousarray(part, "<f8").tobytes() for part in parts)
+
+
+def main() -> int:
+    """Prints what a pair costs; the exit status."""
+    board, image, recording, program = sys.argv[1:5]
+    found = on_board(board, Path(image))
+    desk = at_desk(Path(program), Path(recording))
+    print(f"{'pair, s':>9}{'eyes, Minstr':>14}{'filter':>9}   the desk's bits")
+    for pair, other, look, update in zip(found.pairs, desk, found.look, found.update, strict=False):
+        same = "same" if pair == other else "DIFFER"
+        print(f"{pair.t_ns * 1e-9:9.3f}{look * 1e-6:14.2f}{update * 1e-6:9.2f}   {same}")
+    later = found.look[1:]
+    print(
+        f"eyes: {np.mean(later) * 1e-6:.2f} million instructions a pair, "
+        f"{max(later) * 1e-6:.2f} at most, {found.look[0] * 1e-6:.2f} the first, all births; {found.eyes_bytes} bytes of eyes "
+        f"and {found.session_bytes} of session; stack {found.stack} bytes"
+    )
+    return 0 if found.pairs == desk else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""The format of recordings and links (docs/REPLAY-FORMAT.md): messages, their bytes, and frames."""
