@@ -262,7 +262,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t dim = 12 + 3 * driven.belief.count;
     state_bytes_save(&state, &driven);
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
-    TEST_ASSERT_EQUAL_UINT32(17, number_at(4, 4));
+    TEST_ASSERT_EQUAL_UINT32(18, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
     TEST_ASSERT_EQUAL_UINT(62, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.belief.count, number_at(count_at, 4));
