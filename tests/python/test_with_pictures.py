@@ -52,7 +52,7 @@ def tracker_of(messages: list[Message]) -> Tracker:
         four = (getattr(rig, f"{side}_{name}_px") for name in ("fx", "fy", "cx", "cy"))
         model = models[getattr(rig, f"{side}_model")]
         k = () if model is LensModel.NONE else tuple(getattr(rig, f"{side}_k").tolist())
-        return Lens(model, tuple(four), k, rig.width_px, rig.height_px)  # type: ignore[arg-type]
+        return Lens(model, tuple(four), k, rig.width_px, rig.height_px)
 
     given = Rig(Path(), lens("left"), lens("right"), Poses(rig.R_RL, rig.t_RL_m))
     return Tracker(given, tracks=rig.tracks or 400, camera=header.camera)
