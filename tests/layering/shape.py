@@ -28,6 +28,7 @@ ROOMS = ("state", "process", "sensor", "filter")
 ROOMS_WITH_PARTS = (
     "math",
     "record",
+    "limits",
     "state",
     "process",
     "sensor",

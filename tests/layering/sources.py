@@ -211,6 +211,16 @@ def check_session(root: Path) -> Iterator[Breach]:
                 yield Breach(path, number, "the phase is changed by plr_phase_change alone")
 
 
+def check_imu_phase(root: Path) -> Iterator[Breach]:
+    """One function changes the phase of an IMU's start."""
+    for path in sorted((root / "src").glob("*/*.[ch]")):
+        if path.stem == "imu_phase" or path.parent.name == "session":
+            continue
+        for number, line in code_lines(path):
+            if SETS_PHASE.search(line):
+                yield Breach(path, number, "the phase is changed by plr_imu_phase_change alone")
+
+
 def check_session_table(root: Path) -> Iterator[Breach]:
     """docs/REPLAY-FORMAT.md shows the table of phases and kinds that the session goes by."""
     page = root / "docs" / "REPLAY-FORMAT.md"
@@ -280,6 +290,7 @@ def check_textbook_is_another(root: Path) -> Iterator[Breach]:
 CHECKS = (
     check_layers,
     check_session,
+    check_imu_phase,
     check_session_table,
     check_conditions,
     check_licence_lines,

@@ -6,7 +6,6 @@
 #include "limits/limits.h"
 #include "supervise/doubt.h"
 
-
 enum { STATES = PLR_DOUBT_SETTLING + 1, EVENTS = PLR_DOUBT_SETTLES + 1 };
 
 static void test_every_event_leads_where_it_should_from_every_doubt(void) {
@@ -62,7 +61,8 @@ static void test_a_rule_that_is_left_out_has_its_other_value_and_no_other_has(vo
         for (unsigned k = 0; k < PLR_LIMITS; k++) {
             const plr_limit_row *row = plr_limit_at(k);
             const double due = k == i ? row->off : row->value;
-            TEST_ASSERT_EQUAL_DOUBLE((double)(plr_real)due, (double)plr_limit(left_out, (plr_limit_id)k));
+            TEST_ASSERT_EQUAL_DOUBLE((double)(plr_real)due,
+                                     (double)plr_limit(left_out, (plr_limit_id)k));
         }
     }
 }
