@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
-import pytest
 from firmware import pictures
 from pelorus import Tracker
+from pelorus.converters import euroc, with_pictures
+from pelorus.converters.streams import Asked
 from pelorus.math.se3 import Poses
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
@@ -93,26 +94,13 @@ def test_a_log_of_pictures_replays_without_them_to_the_same_bits(tmp_path: Path)
     assert first == second
 
 
-@pytest.mark.parametrize(
-    ("format_", "folder"),
-    [("euroc", "images/euroc-mh01-start"), ("kitti", "images/kitti-06-start")],
-)
-def test_pictures_of_a_data_set_are_kept(
-    format_: str,
-    folder: str,
-    real: Callable[[str], Path],
-    pelorus: Callable[..., object],
-    tmp_path: Path,
+def test_pictures_through_real_lenses_are_kept_and_seen_alike(
+    real: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    target = tmp_path / "drive.plr"
-    pelorus("convert", format_, real(folder), target, "--keep-pictures")
-    messages = framing.messages_of(target)
-    assert not any(isinstance(m, Stereo) for m in messages)
-    rig = [m for m in messages if isinstance(m, RigMessage)]
-    assert len(rig) == (format_ == "euroc")
-    if rig:  # real lenses
-        times = sorted({m.t_ns for m in messages if isinstance(m, Image)})[:8]
-        few = [m for m in messages if not isinstance(m, Image) or m.t_ns in times]
-        assert_the_same(list(standing(few)), tmp_path)
-    else:
-        assert len(list(itertools.islice(pairs_of(messages), 3))) == 3
+    folder = real("images/euroc-v101-start/mav0/cam0/data.csv").parents[2]
+    kept = with_pictures.recording(euroc.read(folder, Asked()))
+    assert kept.pictures is not None
+    assert not len(kept.tracks)
+    whole = kept.pictures
+    few = replace(whole, t_ns=whole.t_ns[:7], read=lambda: islice(whole.read(), 7))
+    assert_the_same(list(standing(list(replace(kept, pictures=few).messages()))), tmp_path)

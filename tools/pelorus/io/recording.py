@@ -114,8 +114,8 @@ class Recording:
         yield from self.known
         if self.start is not None:
             yield self.start
-        streams = (self._twists(), self._imu(), self._small(), self._truths(), self._stereos())
-        streams = (*streams, self._images())
+        data = (self._twists(), self._imu(), self._small(), self._truths())
+        streams = (*data, self._stereos(), self._images())
         for _, _, message in heapq.merge(*streams, key=lambda entry: entry[:2]):
             yield message
 
