@@ -35,7 +35,12 @@ TYPE = re.compile(
 CONSTANT = re.compile(r"(\w+)\s*(?:=[^,]*)?(?:,|$)")
 MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.M)
 # Rooms that a build may leave out, with their options.
-ROOMS = {"supervise": "PLR_SUPERVISE", "known_map": "PLR_KNOWN_MAP", "vision": "PLR_VISION", "eyes": "PLR_VISION"}
+ROOMS = {
+    "supervise": "PLR_SUPERVISE",
+    "known_map": "PLR_KNOWN_MAP",
+    "vision": "PLR_VISION",
+    "eyes": "PLR_VISION",
+}
 # Files between which config.h chooses: the condition, the file if it holds, and if not.
 CHOICES = {
     "PLR_TILE_FILE": ("PLR_TILE_CORTEX_M", "math/tile_cortex_m.h", "math/tile_in_c.h"),

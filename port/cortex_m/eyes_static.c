@@ -3,7 +3,8 @@
  * reach them; eyes are the processor's alone. */
 #include "eyes.h"
 
-static uint8_t pictures[2][PLR_VISION_PIXELS] __attribute__((aligned(32), section(".bss.pictures")));
+static uint8_t pictures[2][PLR_VISION_PIXELS]
+    __attribute__((aligned(32), section(".bss.pictures")));
 static plr_eyes eyes __attribute__((section(".bss.eyes")));
 
 plr_eyes *firmware_eyes(void) {

@@ -17,7 +17,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 17 };
+enum { STATE_VERSION = 18 };
 
 /* ---------------------------------------------------------------- layout */
 

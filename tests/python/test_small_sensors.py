@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -20,6 +21,7 @@ from pelorus.simulate.mishaps import Mishaps
 from pelorus.simulate.readings import Sensing
 from pelorus.simulate.settings import Span
 from pelorus.simulate.simulate import Options, simulate
+from pelorus.wire import framing as wire
 from pelorus.wire.frames import Reading
 from pelorus.wire.layout import Floats
 from replay_drive import ROOT, judged, run
@@ -139,11 +141,41 @@ def test_info_shows_readings_by_sensor(tmp_path: Path, pelorus: Run) -> None:
         "READING 529",
         "READING wheel 0.020 10.000 50.00 0",
         "READING standstill 2.000 4.800 10.00 0",
-        "500 readings of a wheel, axes xy, sigma 0.03 (median)",
+        "500 readings of a wheel, axes xy, sigma 0.03 (median), values",
+        "the wheels sit at (0, 0, 0) m (x, y, z of the body); they read exactly 0 for 0.0 of",
         "29 readings of a standstill, axes vw, sigma 0.002, 0.0005 (median)",
         "no damage",
     ):
         assert words in said, words
+
+
+@pytest.mark.parametrize(("track_m", "stand_s"), [(0.5, 4.0), (0.0, 7.5)])
+def test_info_tells_where_wheels_sit_what_they_read_and_for_how_long_they_stand(
+    track_m: float, stand_s: float, tmp_path: Path, pelorus: Run
+) -> None:
+    target, stands = tmp_path / "x.plr", tmp_path / "still.plr"
+    rates = ("--imu-rate", 200, "--wheel-rate", 50, "--wheel-track", track_m)
+    pelorus("simulate", target, "--duration", 15, *rates)
+    messages = list(wire.messages_of(target))
+    end_ns = next(m.t_ns for m in messages if isinstance(m, Reading)) + stand_s * 1e9
+    for k, m in enumerate(messages):
+        if isinstance(m, Reading) and m.t_ns < end_ns:
+            messages[k] = replace(m, value=np.zeros(3))
+    wire.write_file(stands, messages, len(messages))
+    (wheel,) = json.loads(pelorus("info", stands, "--json").out)["sensors"].values()
+    assert wheel["zero_s"] == pytest.approx(stand_s, abs=0.1)
+    sides = [place[1] for place in wheel["places_B_m"]]
+    assert sides == pytest.approx([-track_m / 2, track_m / 2] if track_m else [0.0])
+    ((least, most),) = wheel["ranges"]
+    assert least == 0
+    assert most == max(m.value[0] for m in messages if isinstance(m, Reading))
+
+
+def test_no_option_of_simulate_has_the_name_of_another(pelorus: Run) -> None:
+    said = pelorus("simulate", "--help").out
+    names = re.findall(r"^│ (--[a-z-]+)\s", said, re.MULTILINE)
+    assert len(names) > 50
+    assert sorted(names) == sorted(set(names))
 
 
 def test_info_tells_of_pauses_and_of_sensors_that_it_does_not_know(

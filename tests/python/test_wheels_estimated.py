@@ -86,7 +86,7 @@ def test_a_slip_in_the_dark_is_told_and_costs_nothing(seed: int, tmp_path: Path)
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_scale_and_distance_of_wheels_are_found_in_a_minute(seed: int, tmp_path: Path) -> None:
-    two = Sensing(50.0, (0.01,), "x", track_m=0.5, scale_percent=3.0, track_percent=5.0)
+    two = Sensing(50.0, (0.01,), "x", track_m=0.5, scale_percent=3.0, track_off_percent=5.0)
     drive = driven(seed, two, lap_s=12.0, duration_s=62.0)
     sigmas = ("--wheel-scale-sigma", 0.03, "--wheel-track-sigma", 0.05)
     listed = ("--calibrate", "wheel-scale,wheel-track")

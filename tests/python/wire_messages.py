@@ -199,13 +199,13 @@ def an_image(random: np.random.Generator) -> Message:
 
 
 def a_rig(random: np.random.Generator) -> Message:
-    models = random.integers(3, size=2).tolist()
-    lenses = reals(random, 2, 4).tolist()
-    return image.RigMessage(
-        whole(random, 16), whole(random, 16), models[0], *lenses[0], models[1], *lenses[1],
-        reals(random, 8), reals(random, 8), reals(random, 3, 3), reals(random, 3),
-        float(reals(random)), whole(random, 16), whole(random, 16),
-    )  # fmt: skip
+    lenses: list[Any] = []
+    for _ in range(2):
+        lenses += [int(random.integers(3)), *reals(random, 4).tolist()]
+    rest = (reals(random, 8), reals(random, 8), reals(random, 3, 3), reals(random, 3))
+    ends = (float(reals(random)), whole(random, 16), whole(random, 16))
+    values: list[Any] = [whole(random, 16), whole(random, 16), *lenses, *rest, *ends]
+    return image.RigMessage(*values)
 
 
 MAKERS = [

@@ -252,7 +252,7 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
     const uint32_t count_at = 13 + 9 * 62 + 17 * real;
-    const uint32_t frames_at = count_at + 4 + 18 + 24 + 2 + 143 * real;
+    const uint32_t frames_at = count_at + 4 + 22 + 24 + 2 + 143 * real;
     const uint32_t health_at = frames_at + 212 + 436 * real;
     const uint32_t totals_at = health_at + 25;
     const uint32_t slots_at = totals_at + 68 + 56;
@@ -262,7 +262,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t dim = 12 + 3 * driven.belief.count;
     state_bytes_save(&state, &driven);
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
-    TEST_ASSERT_EQUAL_UINT32(17, number_at(4, 4));
+    TEST_ASSERT_EQUAL_UINT32(18, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
     TEST_ASSERT_EQUAL_UINT(62, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.belief.count, number_at(count_at, 4));
@@ -276,7 +276,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.belief.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.belief.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.belief.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(980 + 596 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(984 + 596 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(slots_at + driven.belief.count * slot +
                                  (dim * (dim + 1) / 2 + 5 * dim + 5) * real,
                              state.length);

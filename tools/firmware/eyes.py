@@ -117,8 +117,9 @@ def main() -> int:
     later = found.look[1:]
     print(
         f"eyes: {np.mean(later) * 1e-6:.2f} million instructions a pair, "
-        f"{max(later) * 1e-6:.2f} at most, {found.look[0] * 1e-6:.2f} the first, all births; {found.eyes_bytes} bytes of eyes "
-        f"and {found.session_bytes} of session; stack {found.stack} bytes"
+        f"{max(later) * 1e-6:.2f} at most, {found.look[0] * 1e-6:.2f} the first, all births; "
+        f"{found.eyes_bytes} bytes of eyes and "
+        f"{found.session_bytes} of session; stack {found.stack} bytes"
     )
     return 0 if found.pairs == desk else 1
 

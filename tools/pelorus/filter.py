@@ -182,8 +182,8 @@ class Filter:
         self._callbacks = binding.Map(None, binding.Sink(self._take), binding.Source(self._find))
         given = binding.Calibration(
             *(
-                real(f"calibration: {name}", getattr(calibration, name))
-                for name, _ in binding.Calibration._fields_[:5]
+                real(f"calibration: {field[0]}", getattr(calibration, field[0]))
+                for field in binding.Calibration._fields_[:5]
             ),
             _pose("calibration", calibration.R_CB, calibration.t_CB_m),
         )

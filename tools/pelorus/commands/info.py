@@ -10,9 +10,10 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from pelorus.converters.wheels import WHEEL
 from pelorus.evaluate import survey_json
 from pelorus.evaluate.inertial_survey import ImuSurvey
-from pelorus.evaluate.survey import Survey, TrackSurvey, require_useful, survey
+from pelorus.evaluate.survey import SensorSurvey, Survey, TrackSurvey, require_useful, survey
 from pelorus.io.small_sensors import SMALL_SENSORS
 from pelorus.program.console import one_line, out, print_json
 from pelorus.wire.calibrated import Calibrated
@@ -164,8 +165,21 @@ def _show_sensors(found: Survey) -> None:
         axes = "".join(x for k, x in enumerate(letters.get(name, "012")) if sensor.axes >> k & 1)
         sigma = ", ".join(f"{x:.3g}" for x in dict.fromkeys(sensor.sigma))
         out.print(
-            f"{sensor.stream.count} readings of a {name}, axes {axes}, sigma {sigma} (median)"
+            f"{sensor.stream.count} readings of a {name}, axes {axes}, sigma {sigma} (median), "
+            f"values {_ranges(sensor.ranges)}"
         )
+        if name == WHEEL.name:
+            _show_wheels(sensor)
+
+
+def _show_wheels(sensor: SensorSurvey) -> None:
+    """Prints where the wheels sit, and for how long they stand."""
+    places = ", ".join(f"({', '.join(f'{x:g}' for x in place)})" for place in sensor.places_B_m)
+    length_s = (sensor.stream.last_ns - sensor.stream.first_ns) * 1e-9
+    out.print(
+        f"    the wheels sit at {places} m (x, y, z of the body); they read exactly 0 for "
+        f"{sensor.zero_s:.1f} of {length_s:.1f} s"
+    )
 
 
 def _show_imu(imu: ImuSurvey, origin_ns: int) -> None:

@@ -40,10 +40,6 @@ class Drift(NamedTuple):
     def percent(self) -> float:
         return 100 * self.position_m / self.length_m
 
-    @property
-    def deg_per_m(self) -> float:
-        return self.rotation_deg / self.length_m
-
 
 def drifts(accuracy: Accuracy) -> list[Drift]:
     """Returns the drifts over lengths 1, 2, 5, 10 ... up to half the path; short ones first."""

@@ -76,6 +76,9 @@ class SensorSurvey:
     stream: Stream
     axes: int  # bits: all that were measured at any time
     sigma: tuple[float, ...]  # median of each measured number
+    ranges: tuple[tuple[float, float], ...]  # least and most of each
+    places_B_m: tuple[tuple[float, ...], ...]  # where on the body they sit
+    zero_s: float  # for how long all measured numbers are 0
 
 
 @dataclass(frozen=True)
@@ -149,11 +152,17 @@ def _sensors(readings: list[Reading]) -> dict[str, SensorSurvey]:
     for number in sorted({m.sensor for m in readings}):
         own = [m for m in readings if m.sensor == number]
         has = np.array([[m.axes >> k & 1 for k in range(3)] for m in own], bool)
-        sigma = np.array([m.sigma for m in own])
+        sigma, value = np.array([m.sigma for m in own]), np.array([m.value for m in own])
+        measured = [(value[has[:, k], k], sigma[has[:, k], k]) for k in range(3) if has[:, k].any()]
+        stream = _stream(_times(own), ties=True)
+        zero = int(np.sum(~np.any(has & (value != 0), axis=1)))
         found[name_of(number)] = SensorSurvey(
-            _stream(_times(own), ties=True),
+            stream,
             int(np.bitwise_or.reduce([m.axes for m in own])),
-            tuple(float(np.median(sigma[has[:, k], k])) for k in range(3) if has[:, k].any()),
+            tuple(float(np.median(sigmas)) for _, sigmas in measured),
+            tuple((float(values.min()), float(values.max())) for values, _ in measured),
+            tuple(sorted({tuple(m.at_B_m.tolist()) for m in own})),
+            zero / len(own) * (stream.last_ns - stream.first_ns) * 1e-9,
         )
     return found
 

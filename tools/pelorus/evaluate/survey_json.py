@@ -35,7 +35,14 @@ def of(found: Survey) -> dict[str, Any]:
         "landmarks": found.landmarks,
         "streams": {kind.name: _stream(stream, origin) for kind, stream in found.streams.items()},
         "sensors": {
-            name: _stream(sensor.stream, origin) | {"axes": sensor.axes, "sigma": sensor.sigma}
+            name: _stream(sensor.stream, origin)
+            | {
+                "axes": sensor.axes,
+                "sigma": sensor.sigma,
+                "ranges": sensor.ranges,
+                "places_B_m": sensor.places_B_m,
+                "zero_s": sensor.zero_s,
+            }
             for name, sensor in found.sensors.items()
         },
         "calibrated": found.calibrated.figures if found.calibrated else None,

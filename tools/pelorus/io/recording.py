@@ -114,9 +114,9 @@ class Recording:
         yield from self.known
         if self.start is not None:
             yield self.start
-        streams = (self._twists(), self._imu(), self._small(), self._truths(), self._stereos())
-        streams = (*streams, self._images())
-        for _, _, message in heapq.merge(*streams, key=lambda entry: entry[:2]):
+        moving = (self._twists(), self._imu(), self._small())
+        seen = (self._truths(), self._stereos(), self._images())
+        for _, _, message in heapq.merge(*moving, *seen, key=lambda entry: entry[:2]):
             yield message
 
     def __len__(self) -> int:

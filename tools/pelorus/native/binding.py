@@ -12,13 +12,29 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pelorus import __version__
 from pelorus.errors import PelorusError
-from pelorus.native.structure import Struct, with_reasons
+from pelorus.native.structure import (
+    F32,
+    F64,
+    U8,
+    U16,
+    U32,
+    U64,
+    Address,
+    Bool,
+    Doubles3,
+    Doubles9,
+    Floats6,
+    Int,
+    Reasons,
+    Struct,
+    Text,
+    of_header,
+)
 from pelorus.program import distribution
-from pelorus.wire.reason import Reason
 
 Precision = Literal["float32", "float64"]
 
@@ -39,254 +55,162 @@ def folders(chosen: Path | None) -> list[Path]:
     return [named] if named else [PACKAGED, BUILT, SOURCE_ROOT / BUILT]
 
 
-def _doubles(n: int) -> type[c.Array[c.c_double]]:
-    return c.c_double * n
-
-
-def _floats(n: int) -> type[c.Array[c.c_float]]:
-    return c.c_float * n
-
-
+@of_header("plr_pose")
 class Pose(Struct):
     """A rigid motion x -> R x + p."""
 
-    c_name = "plr_pose"
-    _fields_ = (("R", _doubles(9)), ("p", _doubles(3)))
+    R: Doubles9
+    p: Doubles3
 
 
+@of_header("plr_twist")
 class Twist(Struct):
     """A velocity in the body's axes; for an IMU specific force and rate."""
 
-    c_name = "plr_twist"
-    _fields_ = (("linear", _doubles(3)), ("angular", _doubles(3)))
+    linear: Doubles3
+    angular: Doubles3
 
 
+@of_header("plr_calibration")
 class Calibration(Struct):
     """A rectified stereo camera."""
 
-    c_name = "plr_calibration"
-    _fields_ = (
-        ("fx_px", c.c_double),
-        ("fy_px", c.c_double),
-        ("cx_px", c.c_double),
-        ("cy_px", c.c_double),
-        ("baseline_m", c.c_double),
-        ("T_CB", Pose),
-    )
+    fx_px: F64
+    fy_px: F64
+    cx_px: F64
+    cy_px: F64
+    baseline_m: F64
+    T_CB: Pose
 
 
+@of_header("plr_frame")
 class Frame(Struct):
     """The observations of one stereo pair."""
 
-    c_name = "plr_frame"
-    t_ns: int
-    budget: int
-    count: int
-    observations: int | None
-    _fields_ = (
-        ("t_ns", c.c_uint64),
-        ("budget", c.c_uint16),
-        ("count", c.c_uint16),
-        ("observations", c.c_void_p),
-    )
+    t_ns: U64
+    budget: U16
+    count: U16
+    observations: Address
 
 
+@of_header("plr_landmark")
 class Landmark(Struct):
     """A landmark in the world."""
 
-    c_name = "plr_landmark"
-    id: int
-    times_seen: int
-    times_gated: int
-    last_seen_ns: int
-    known: bool
-    p_W_m: c.Array[c.c_double]
-    P_W_m2: c.Array[c.c_double]
-    _fields_ = (
-        ("id", c.c_uint32),
-        ("times_seen", c.c_uint32),
-        ("times_gated", c.c_uint32),
-        ("last_seen_ns", c.c_uint64),
-        ("known", c.c_bool),
-        ("p_W_m", _doubles(3)),
-        ("P_W_m2", _doubles(9)),
-    )
+    id: U32
+    times_seen: U32
+    times_gated: U32
+    last_seen_ns: U64
+    known: Bool
+    p_W_m: Doubles3
+    P_W_m2: Doubles9
 
 
+@of_header("plr_reading")
 class Reading(Struct):
     """A reading of a small sensor."""
 
-    c_name = "plr_reading"
-    _fields_ = (
-        ("t_ns", c.c_uint64),
-        ("sensor", c.c_uint8),
-        ("axes", c.c_uint8),
-        ("value", _doubles(3)),
-        ("sigma", _doubles(3)),
-        ("at_B_m", _doubles(3)),
-    )
+    t_ns: U64
+    sensor: U8
+    axes: U8
+    value: Doubles3
+    sigma: Doubles3
+    at_B_m: Doubles3
 
 
+@of_header("plr_reading_result")
 class ReadingResult(Struct):
     """The result of a reading: `used`, and `d2`, its squared distance from the prediction."""
 
-    c_name = "plr_reading_result"
-    status: int
-    used: bool
-    d2: float
-    _fields_ = (("status", c.c_int), ("used", c.c_bool), ("d2", c.c_double))
+    status: Int
+    used: Bool
+    d2: F64
 
 
-@with_reasons
+@of_header("plr_report")
 class Report(Struct):
     """The result of one stereo frame: plr_report of include/pelorus/types.h.
 
     Its reasons are flags: `Reason.FROZEN_IMAGE in report.reasons`.
     """
 
-    c_name = "plr_report"
-    t_ns: int
-    status: int
-    health: int
-    reasons: Reason
-    budget: int
-    observations: int
-    matched: int
-    used: int
-    gated: int
-    created: int
-    evicted: int
-    refused: int
-    duplicates: int
-    no_room: int
-    poor: int
-    left_out: int
-    blocks_failed: int
-    active: int
-    nis_dof: int
-    nis: float
-    innovation_rows: int
-    innovation_d2: float
-    innovation_log_det: float
-    _fields_ = (
-        ("t_ns", c.c_uint64),
-        ("status", c.c_int),
-        ("health", c.c_int),
-        ("reasons", c.c_uint32),
-        ("budget", c.c_uint16),
-        ("observations", c.c_uint16),
-        ("matched", c.c_uint16),
-        ("used", c.c_uint16),
-        ("gated", c.c_uint16),
-        ("created", c.c_uint16),
-        ("evicted", c.c_uint16),
-        ("refused", c.c_uint16),
-        ("duplicates", c.c_uint16),
-        ("no_room", c.c_uint16),
-        ("poor", c.c_uint16),
-        ("left_out", c.c_uint16),
-        ("blocks_failed", c.c_uint16),
-        ("active", c.c_uint16),
-        ("nis_dof", c.c_uint16),
-        ("nis", c.c_float),
-        ("innovation_rows", c.c_uint16),
-        ("innovation_d2", c.c_float),
-        ("innovation_log_det", c.c_float),
-    )
+    t_ns: U64
+    status: Int
+    health: Int
+    reasons: Reasons
+    budget: U16
+    observations: U16
+    matched: U16
+    used: U16
+    gated: U16
+    created: U16
+    evicted: U16
+    refused: U16
+    duplicates: U16
+    no_room: U16
+    poor: U16
+    left_out: U16
+    blocks_failed: U16
+    active: U16
+    nis_dof: U16
+    nis: F32
+    innovation_rows: U16
+    innovation_d2: F32
+    innovation_log_det: F32
 
 
+@of_header("plr_rejected_landmark")
 class RejectedLandmark(Struct):
     """A landmark that was seen and not used."""
 
-    c_name = "plr_rejected_landmark"
-    id: int
-    why: int
-    in_succession: int
-    mean2: float
-    _fields_ = (
-        ("id", c.c_uint32),
-        ("why", c.c_uint8),
-        ("in_succession", c.c_uint16),
-        ("mean2", c.c_float),
-    )
+    id: U32
+    why: U8
+    in_succession: U16
+    mean2: F32
 
 
+@of_header("plr_supervision")
 class Supervision(Struct):
     """What the supervisor saw in one frame and decided: plr_supervision of include/pelorus/types.h.
 
     Differences are (rho, theta): m and rad in the body's axes.
     """
 
-    c_name = "plr_supervision"
-    t_ns: int
-    nu: c.Array[c.c_float]
-    moved: c.Array[c.c_float]
-    statistic: float
-    usual: c.Array[c.c_float]
-    agreement: float
-    weight: float
-    difference: c.Array[c.c_float]
-    doubt: int
-    applied: bool
-    outright: bool
-    waits: bool
-    holds_biases: bool
-    locked: bool
-    frozen: bool
-    misfits: bool
-    settled: bool
-    matched: int
-    same: int
-    known: int
-    adopted: int
-    count: int
-    rejected: c.Array[RejectedLandmark]
-    _fields_ = (
-        ("t_ns", c.c_uint64),
-        ("nu", _floats(6)),
-        ("moved", _floats(6)),
-        ("statistic", c.c_float),
-        ("usual", _floats(6)),
-        ("agreement", c.c_float),
-        ("weight", c.c_float),
-        ("difference", _floats(6)),
-        ("doubt", c.c_uint8),
-        ("applied", c.c_bool),
-        ("outright", c.c_bool),
-        ("waits", c.c_bool),
-        ("holds_biases", c.c_bool),
-        ("locked", c.c_bool),
-        ("frozen", c.c_bool),
-        ("misfits", c.c_bool),
-        ("settled", c.c_bool),
-        ("matched", c.c_uint16),
-        ("same", c.c_uint16),
-        ("known", c.c_uint16),
-        ("adopted", c.c_uint16),
-        ("count", c.c_uint8),
-        ("rejected", RejectedLandmark * REJECTED),
-    )
+    t_ns: U64
+    nu: Floats6
+    moved: Floats6
+    statistic: F32
+    usual: Floats6
+    agreement: F32
+    weight: F32
+    difference: Floats6
+    doubt: U8
+    applied: Bool
+    outright: Bool
+    waits: Bool
+    holds_biases: Bool
+    locked: Bool
+    frozen: Bool
+    misfits: Bool
+    settled: Bool
+    matched: U16
+    same: U16
+    known: U16
+    adopted: U16
+    count: U8
+    rejected: Annotated[c.Array[RejectedLandmark], RejectedLandmark * REJECTED]
 
 
-@with_reasons
+@of_header("plr_health_state")
 class Health(Struct):
     """How far the estimate may be trusted; seconds since what never happened are infinite."""
 
-    c_name = "plr_health_state"
-    health: int
-    reasons: Reason
-    seconds_without_frame: float
-    seconds_without_use: float
-    seconds_without_twist: float
-    resets: int
-    _fields_ = (
-        ("health", c.c_int),
-        ("reasons", c.c_uint32),
-        ("seconds_without_frame", c.c_double),
-        ("seconds_without_use", c.c_double),
-        ("seconds_without_twist", c.c_double),
-        ("resets", c.c_uint32),
-    )
+    health: Int
+    reasons: Reasons
+    seconds_without_frame: F64
+    seconds_without_use: F64
+    seconds_without_twist: F64
+    resets: U32
 
 
 COUNTS_32 = (
@@ -297,55 +221,40 @@ COUNTS_32 = (
 COUNTS_64 = ("observations", "matched", "used", "gated", "created", "evicted", "diverged_ns")
 
 
+@of_header("plr_totals")
 class Totals(Struct):
     """Counts since the filter was made: plr_totals of include/pelorus/state.h."""
 
-    c_name = "plr_totals"
     _fields_ = (
         *((name, c.c_uint32) for name in COUNTS_32),
         *((name, c.c_uint64) for name in COUNTS_64),
     )
 
 
+@of_header("plr_setting")
 class Setting(Struct):
     """A row of the table of settings."""
 
-    c_name = "plr_setting"
-    id: int
-    name: bytes
-    unit: bytes
-    minimum: float
-    maximum: float
-    _fields_ = (
-        ("id", c.c_uint8),
-        ("name", c.c_char_p),
-        ("unit", c.c_char_p),
-        ("kind", c.c_int),
-        ("choices", c.c_void_p),
-        ("minimum", c.c_double),
-        ("maximum", c.c_double),
-        ("standard", c.c_double),
-    )
+    id: U8
+    name: Text
+    unit: Text
+    kind: Int
+    choices: Address
+    minimum: F64
+    maximum: F64
+    standard: F64
 
 
+@of_header("plr_sizes")
 class Sizes(Struct):
     """The options that determine the memory layout of a filter."""
 
-    c_name = "plr_sizes"
-    bytes: int
-    real: int
-    landmarks: int
-    observations: int
-    block: int
-    calibration: int
-    _fields_ = (
-        ("bytes", c.c_uint32),
-        ("real", c.c_uint32),
-        ("landmarks", c.c_uint32),
-        ("observations", c.c_uint32),
-        ("block", c.c_uint32),
-        ("calibration", c.c_uint32),
-    )
+    bytes: U32
+    real: U32
+    landmarks: U32
+    observations: U32
+    block: U32
+    calibration: U32
 
 
 Sink = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Landmark))
@@ -354,11 +263,13 @@ StateSink = c.CFUNCTYPE(c.c_int, c.c_void_p, c.c_void_p, c.c_uint32)
 StateSource = c.CFUNCTYPE(c.c_int, c.c_void_p, c.c_uint32, c.c_void_p, c.c_uint32)
 
 
+@of_header("plr_map")
 class Map(Struct):
     """The caller's store of landmarks."""
 
-    c_name = "plr_map"
-    _fields_ = (("context", c.c_void_p), ("sink", Sink), ("source", Source))
+    context: Address
+    sink: Annotated[Any, Sink]
+    source: Annotated[Any, Source]
 
 
 STRUCTS: tuple[type[Struct], ...] = (

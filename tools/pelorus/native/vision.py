@@ -5,141 +5,131 @@ from __future__ import annotations
 
 import ctypes as c
 from functools import cache
-from typing import Any, ClassVar, Protocol, cast
+from typing import Any, Protocol, cast
 
 from pelorus.errors import PelorusError
 from pelorus.native import binding
 from pelorus.native.binding import Frame, Pose, Precision
+from pelorus.native.structure import (
+    F32,
+    F64,
+    U8,
+    U16,
+    U32,
+    U64,
+    Address,
+    Bool,
+    Doubles8,
+    Struct,
+    of_header,
+)
 
 
-class _Struct(c.Structure):
-    """One of include/pelorus/vision.h; its `_fields_` are the header's, in their order."""
-
-    c_name: ClassVar[str]
-
-
-class Lens(_Struct):
+@of_header("plr_lens")
+class Lens(Struct):
     """A pinhole with its lens."""
 
-    c_name = "plr_lens"
-    _fields_ = (
-        ("model", c.c_uint8),
-        ("width_px", c.c_uint16),
-        ("height_px", c.c_uint16),
-        ("fx_px", c.c_double),
-        ("fy_px", c.c_double),
-        ("cx_px", c.c_double),
-        ("cy_px", c.c_double),
-        ("k", c.c_double * 8),
-    )
+    model: U8
+    width_px: U16
+    height_px: U16
+    fx_px: F64
+    fy_px: F64
+    cx_px: F64
+    cy_px: F64
+    k: Doubles8
 
 
-class Rig(_Struct):
+@of_header("plr_rig")
+class Rig(Struct):
     """Two cameras, and how they are read."""
 
-    c_name = "plr_rig"
-    _fields_ = (
-        ("left", Lens),
-        ("right", Lens),
-        ("T_RL", Pose),
-        ("row_time_s", c.c_double),
-        ("disparity_max_px", c.c_uint16),
-        ("tracks", c.c_uint16),
-        ("fx_px", c.c_double),
-        ("fy_px", c.c_double),
-        ("cx_px", c.c_double),
-        ("cy_px", c.c_double),
-    )
+    left: Lens
+    right: Lens
+    T_RL: Pose
+    row_time_s: F64
+    disparity_max_px: U16
+    tracks: U16
+    fx_px: F64
+    fy_px: F64
+    cx_px: F64
+    cy_px: F64
 
 
-class Picture(_Struct):
+@of_header("plr_picture")
+class Picture(Struct):
     """An 8-bit grey picture in the caller's memory."""
 
-    c_name = "plr_picture"
-    _fields_ = (
-        ("pixels", c.c_void_p),
-        ("stride", c.c_uint32),
-        ("width_px", c.c_uint16),
-        ("height_px", c.c_uint16),
-        ("t_ns", c.c_uint64),
-    )
+    pixels: Address
+    stride: U32
+    width_px: U16
+    height_px: U16
+    t_ns: U64
 
 
-class Pair(_Struct):
+@of_header("plr_picture_pair")
+class Pair(Struct):
     """Left and right picture."""
 
-    c_name = "plr_picture_pair"
-    _fields_ = (("left", Picture), ("right", Picture))
+    left: Picture
+    right: Picture
 
 
-class Depth(_Struct):
+@of_header("plr_depth")
+class Depth(Struct):
     """The known depth of a point."""
 
-    c_name = "plr_depth"
-    _fields_ = (("id", c.c_uint32), ("z_m", c.c_float))
+    id: U32
+    z_m: F32
 
 
-class Expected(_Struct):
+@of_header("plr_expected")
+class Expected(Struct):
     """The expected motion of the camera."""
 
-    c_name = "plr_expected"
-    _fields_ = (("motion", Pose), ("depths", c.c_void_p), ("depth_count", c.c_uint16))
+    motion: Pose
+    depths: Address
+    depth_count: U16
 
 
-class Sight(_Struct):
+@of_header("plr_sight")
+class Sight(Struct):
     """Data about an observation."""
 
-    c_name = "plr_sight"
-    _fields_ = (
-        ("id", c.c_uint32),
-        ("age", c.c_uint16),
-        ("sigma_px", c.c_float),
-        ("likeness", c.c_float),
-    )
+    id: U32
+    age: U16
+    sigma_px: F32
+    likeness: F32
 
 
-class EndedTrack(_Struct):
+@of_header("plr_ended_track")
+class EndedTrack(Struct):
     """A track that ended, with the reason."""
 
-    c_name = "plr_ended_track"
-    _fields_ = (("id", c.c_uint32), ("age", c.c_uint16), ("why", c.c_uint8))
+    id: U32
+    age: U16
+    why: U8
 
 
-class VisionReport(_Struct):
+@of_header("plr_vision_report")
+class VisionReport(Struct):
     """The result of one pair: plr_vision_report of include/pelorus/vision.h."""
 
-    c_name = "plr_vision_report"
-    t_ns: int
-    left: int
-    right: int
-    swapped: bool
-    followed: int
-    observed: int
-    born: int
-    corners: int
-    cut_anew: int
-    ended: int
-    steps: int
-    halves_apart_s: float
-    halves_sigma_s: float
-    _fields_ = (
-        ("t_ns", c.c_uint64),
-        ("left", c.c_uint8),
-        ("right", c.c_uint8),
-        ("swapped", c.c_bool),
-        ("followed", c.c_uint16),
-        ("observed", c.c_uint16),
-        ("born", c.c_uint16),
-        ("corners", c.c_uint16),
-        ("cut_anew", c.c_uint16),
-        ("ended", c.c_uint16),
-        ("steps", c.c_uint16),
-        ("halves_apart_s", c.c_float),
-        ("halves_sigma_s", c.c_float),
-    )
+    t_ns: U64
+    left: U8
+    right: U8
+    swapped: Bool
+    followed: U16
+    observed: U16
+    born: U16
+    corners: U16
+    cut_anew: U16
+    ended: U16
+    steps: U16
+    halves_apart_s: F32
+    halves_sigma_s: F32
 
 
-STRUCTS: tuple[type[_Struct], ...] = (
+STRUCTS: tuple[type[Struct], ...] = (
     *(Lens, Rig, Picture, Pair, Depth, Expected, Sight, EndedTrack, VisionReport),
 )
 _VOID = c.c_void_p

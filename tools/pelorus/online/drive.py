@@ -273,6 +273,6 @@ class Drive:
 
     @staticmethod
     def _report_message(frame: Stereo, report: FrameReport) -> Report:
-        same = {name: getattr(report, name) for name, _ in FrameReport._fields_ if name != "t_ns"}
-        names = set(Report.__dataclass_fields__)
-        return Report(frame.t_ns, Kind.STEREO, **{k: v for k, v in same.items() if k in names})
+        told = {field[0] for field in FrameReport._fields_} & set(Report.__dataclass_fields__)
+        same = {name: getattr(report, name) for name in told - {"t_ns"}}
+        return Report(frame.t_ns, Kind.STEREO, **same)

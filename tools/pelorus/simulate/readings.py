@@ -49,7 +49,7 @@ class Sensing:
     scale_percent: float = setting(
         0.0, "The radius is so much larger than was told.", "PERCENT", PERCENT
     )
-    track_percent: float = setting(
+    track_off_percent: float = setting(
         0.0, "The same of the distance between the wheels.", "PERCENT", PERCENT
     )
     slip_percent: float = setting(
@@ -92,7 +92,7 @@ def options_without_meaning(sensor: SmallSensor) -> set[str]:
     """Returns the fields of Sensing that this sensor ignores."""
     without = set() if sensor.has_arm else {"at_m"}
     if sensor.name != "wheel":
-        without |= {"track_m", "scale_percent", "track_percent"}
+        without |= {"track_m", "scale_percent", "track_off_percent"}
         without |= {"slip_percent", "slip_from_s", "slip_for_s"}
     return without | ({"outliers"} if sensor.at_rest else set())
 
@@ -131,7 +131,7 @@ def _read(
     count, numbers = len(rows), len(sensor.columns)
     arm = np.array(sensing.at_m or (0.0, 0.0, 0.0)) + aside_m
     sigma = sensing.sigma_of(sensor)
-    true = sensor.measure(motion.at(rows), arm + sensing.track_percent / 100 * aside_m)
+    true = sensor.measure(motion.at(rows), arm + sensing.track_off_percent / 100 * aside_m)
     slips = Span(sensing.slip_from_s, sensing.slip_for_s).holds(t_ns[rows] - t_ns[0])
     true = true / (1 + sensing.scale_percent / 100)
     true = np.where(slips[:, None], (1 + sensing.slip_percent / 100) * true, true)
