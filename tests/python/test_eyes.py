@@ -50,6 +50,20 @@ def test_a_wall_that_passes_by_is_followed() -> None:
     assert (second.sights["sigma_px"] > 0).all()
 
 
+def test_rows_may_differ_alike_and_a_few_that_differ_otherwise_are_left_out() -> None:
+    left, right = pair(0)
+    lower = np.roll(right, 1, 0)
+    alike = Tracker.rectified(CAMERA, WIDTH, HEIGHT, tracks=30).track(1, left, lower)
+    assert len(alike.observations) >= 20
+    assert np.abs(alike.pixels[:, 3] - alike.pixels[:, 1] - 1).max() < 0.5
+    right = right.copy()
+    right[:, 100:] = lower[:, 100:]
+    seen = Tracker.rectified(CAMERA, WIDTH, HEIGHT, tracks=30).track(1, left, right)
+    assert len(seen.observations) >= 12
+    assert np.abs(seen.pixels[:, 3] - seen.pixels[:, 1]).max() < 0.5
+    assert seen.pixels[:, 2].max() < 104
+
+
 def test_the_virtual_camera_of_a_rectified_pair_is_the_camera_itself() -> None:
     told = Tracker.rectified(CAMERA, WIDTH, HEIGHT).calibration()
     assert (told.fx_px, told.cx_px, told.cy_px) == (200.0, CAMERA.cx_px, CAMERA.cy_px)
