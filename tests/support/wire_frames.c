@@ -101,7 +101,8 @@ plr_status wire_read_payload(plr_kind kind, const uint8_t *payload, size_t n, pl
     const plr_observation_room room = {observations, PLR_WIRE_MAX_OBSERVATIONS};
     TEST_ASSERT_LESS_OR_EQUAL_size_t(sizeof room_at_end, n);
     const uint8_t *at = room_at_end + sizeof room_at_end - n;
-    plr_codec codec = {.direction = PLR_CODEC_READ, .move = plr_codec_take, .context = &at, .left = n};
+    plr_codec codec = {
+        .direction = PLR_CODEC_READ, .move = plr_codec_take, .context = &at, .left = n};
     memcpy(room_at_end + sizeof room_at_end - n, payload, n);
     memset(m, 0, sizeof *m);
     m->kind = kind;
