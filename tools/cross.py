@@ -32,6 +32,7 @@ NATIVE = ROOT / "build/bin/pelorus-replay"
 COMMON = (
     *("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=all", "-g0"),
     *("-DPLR_MAX_LANDMARKS=256", "-DPLR_MAX_OBSERVATIONS=1024", "-DPLR_MAX_CALIBRATION=11"),
+    *("-DPLR_VISION_PIXELS=3145728", "-DPLR_VISION_TRACKS=400"),
 )
 WARNINGS = ("-Wall", "-Wextra", "-Werror")
 RECORDINGS = {
@@ -88,7 +89,7 @@ def compile_to(output: Path, source: Path, target: Target, flags: Sequence[str])
 def replay_sources(target: Target) -> list[Path]:
     """Returns the sources of pelorus-replay, without libzstd, for this system."""
     other = "posix" if target.windows else "windows"
-    left_out = {"compressed_zstd.c", f"system_{other}.c"}
+    left_out = {"compressed_zstd.c", f"system_{other}.c", "pictures_none.c"}
     return sorted(p for p in (ROOT / "port/posix").glob("*.c") if p.name not in left_out)
 
 
