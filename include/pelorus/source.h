@@ -112,7 +112,7 @@ typedef struct plr_wheels {
 typedef struct plr_source {
     plr_real velocity_variance[3], gyro_variance[3]; /* of twists, in the body's axes */
     plr_real bias_velocity_walk, bias_gyro_walk;     /* of twists: variance that a second adds */
-    plr_real R_BI[9], imu_arm[3];         /* the IMU on the body; `given` is seen from the arm */
+    plr_real R_BI[9], imu_arm[3];         /* the IMU on the body; camera.given is as seen from it */
     plr_real gravity;                     /* m/s^2 */
     plr_real accel_density, gyro_density; /* of an IMU: variance times the seconds of a reading */
     plr_real accel_walk_variance, gyro_walk_variance; /* of an IMU: what a second adds */

@@ -62,7 +62,7 @@ typedef struct plr_filter {
 
     plr_camera_model camera;
     plr_source source;
-    plr_motion motion; /* since the last frame */
+    plr_motion motion; /* that is in the pose and not yet in P */
     plr_belief belief;
     plr_workspace work;
     plr_frame_evidence evidence; /* of this frame, for the supervisor */

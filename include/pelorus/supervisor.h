@@ -41,8 +41,9 @@ typedef struct plr_search_evidence {
 
 /* The motion of a frame, by pictures beside odometry. */
 typedef struct plr_motion_evidence {
-    bool applied;                 /* there is one; else nothing below is filled */
-    bool outright;                /* as above, and it was followed */
+    bool applied; /* there is one; else nothing below is filled */
+    bool
+        outright; /* the points agreed on a motion that the odometry excludes, and that one was applied */
     plr_real E[9], p[3];          /* the motion that was applied: (I + E, p) */
     plr_real moved[PLR_POSE_DIM]; /* by how much the frame moved the pose beside odometry: m, rad */
     plr_real L[PLR_POSE_SQUARE];  /* sigmas of the odometry as stated: lower triangle, 6x6 */

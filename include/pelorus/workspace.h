@@ -54,7 +54,8 @@ typedef struct plr_sightings {
     uint8_t terms; /* 2: the rows depend on the pose too */
 } plr_sightings;
 
-/* Workspace of one call; its contents are not used by later calls. */
+/* Workspace of one call. Later calls read two things of it: the rows of the last frame, for
+ * plr_filter_supervision, and noise.open, which is 0 between frames. */
 typedef struct plr_workspace {
     /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
      * The kernels read a little further than they use, hence the margins. */

@@ -11,7 +11,8 @@
 /* plr_filter.magic of an initialised filter. */
 #define PLR_FILTER_MAGIC 0x504C5231U
 
-/* Forgets the last twist reading: the body is assumed to stand still, reading - bias = 0. */
+/* Forgets the last reading. Until the next one the body is assumed to stand still, by twists, or to keep its
+ * velocity, by an IMU. */
 void plr_filter_forget_reading(plr_filter *f);
 
 /* The prior's variance of bias k of 0 to 5, as the settings say. */
@@ -34,7 +35,7 @@ plr_status plr_filter_refuse(plr_filter *f, plr_status status);
 /* What odometry and small sensors have sent, at a time of the caller's or the filter's. */
 plr_readings_evidence plr_filter_readings_at(const plr_filter *f, plr_time_ns now_ns);
 
-/* The motion since the last frame, for the supervisor; the matches are not filled. */
+/* The motion that is not yet in P, for the supervisor; the matches are not filled. */
 void plr_filter_pending_motion(const plr_filter *f, plr_picture_evidence *e);
 
 /* Tells the supervisor of the pending motion, which is about to be applied without a frame. */

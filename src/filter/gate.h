@@ -23,7 +23,7 @@ typedef enum plr_gate_result {
     PLR_GATE_REJECTED,
     PLR_GATE_FAR,
     PLR_GATE_LOST,
-    PLR_GATE_NOT_JUDGED /* so far, or for want of a landmark */
+    PLR_GATE_NOT_JUDGED /* not yet, or there is no landmark */
 } plr_gate_result;
 
 /* Compares d^2 with `gate-d2`; with the setting `gate-residual`, the squared norm of the raw

@@ -10,7 +10,8 @@
  * P); `large`, of all slots and the whole of P. A change within one aligned 32-bit word is always
  * found, any other with near certainty, by the next call that uses what was changed. The functions
  * `check` compare checksums with the memory; a call that changes memory ends with a `seal`, which
- * computes them anew. The workspace has no checksum, because its contents are not used by later calls.
+ * computes them anew. The workspace has no checksum: each call fills what it uses of it, but for the rows of the
+ * last frame, which plr_filter_supervision reads, and noise.open, which is 0 between frames.
  *
  * Cost: two or three instructions a word; twice a frame over P, twice a reading over what it changes.
  * Once damage is found the checksums stay wrong, so that every later call is refused too, until an

@@ -12,8 +12,9 @@ void plr_match_in_order(const plr_frame *frame, plr_sightings *sightings, plr_re
 /* Finds the slot of each row; none is judged. */
 void plr_match_slots(plr_filter *f, plr_sightings *sightings);
 
-/* Asks the map source for the ids that the state does not hold. Ids that the map does not have are
- * counted when landmarks are initialised; in slam, so are those without a slot. */
+/* Asks the map source for the ids that the state does not hold, and adds those found to the state and P; where no
+ * slot is free, those unseen for longest are evicted for them. What still finds no slot is counted here in
+ * localization; in slam it is initialised, or counted, with the births. */
 void plr_match_known(plr_filter *f, plr_sightings *sightings, plr_frame_events *events,
                      plr_report *report);
 

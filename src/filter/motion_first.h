@@ -18,8 +18,9 @@ typedef struct plr_motion_first {
                                   `motion` is that one, with a prior wide enough for it */
 } plr_motion_first;
 
-/* Finds nu and gates every matched observation: verdict, d2 and det_S of its row. Call it before the motion
- * is applied to landmarks and P. */
+/* Finds nu and gates every matched observation: verdict, d2 and det_S of its row. Accepted innovations are added
+ * to their landmarks' sums, by which one may be found to move; a lost landmark counts as unseen. Call it before
+ * the motion is applied to landmarks and P. */
 void plr_motion_find(plr_filter *f, plr_sightings *sightings, const plr_picture_decision *decided,
                      plr_motion_first *first);
 

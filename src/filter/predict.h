@@ -25,7 +25,7 @@ plr_status plr_predict_refuse(plr_filter *f, plr_status status);
 
 /* Applies a motion D' (state/motion.h) to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
  * noise is kept in work.noise, not in P, until plr_covariance_close_noise. PLR_E_DIVERGED if a variance is
- * no longer positive; likewise the two below. */
+ * negative or not finite, or the step too large; likewise plr_predict_apply_prior and _pending. */
 plr_status plr_predict_apply(plr_filter *f, const plr_applied_motion *applied);
 
 /* Applies the accumulated motion to landmarks and covariance without observations: at nu = 0. */

@@ -26,8 +26,8 @@ bool plr_relocate_when_lost(plr_filter *f, const plr_sightings *sightings, plr_f
                             plr_picture_decision *decided);
 
 typedef enum plr_relocation {
-    PLR_PLACED,  /* nothing was changed */
-    PLR_MOVED,   /* known landmarks have been dropped, and are to come in again */
+    PLR_PLACED, /* the pose fits the map: nothing was changed */
+    PLR_MOVED, /* the pose was moved to the one found; known landmarks were dropped, and come in again */
     PLR_LEFT_OUT /* those that had just come in have been dropped: no pose fits them */
 } plr_relocation;
 

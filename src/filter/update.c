@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * A stereo frame: predict, match, take up known landmarks, find the motion, gate, correct, evict, initialise, in this order.
+ * A stereo frame: predict, match, take up known landmarks, find the motion and gate, apply it, correct, initialise (which evicts where slots
+ * are too few), judge, in this order.
  * Observations are processed in the order of their ids, so the order in which they arrive changes
  * no bit.
  */
