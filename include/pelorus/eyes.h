@@ -91,12 +91,7 @@ plr_status plr_eyes_init_sized(plr_eyes *e, uint8_t *left, uint8_t *right, uint3
  * PLR_E_ARGUMENT a null pointer; PLR_E_SIZE the caller was compiled with other sizes. */
 static inline plr_status plr_eyes_init(plr_eyes *e, uint8_t *left, uint8_t *right,
                                        uint32_t capacity) {
-    plr_vision_sizes here;
-    here.bytes = (uint32_t)sizeof(plr_eyes);
-    here.real = PLR_REAL;
-    here.pixels = PLR_VISION_PIXELS;
-    here.tracks = PLR_VISION_TRACKS;
-    here.levels = PLR_VISION_LEVELS;
+    const plr_vision_sizes here = plr_vision_sizes_here((uint32_t)sizeof(plr_eyes));
     return plr_eyes_init_sized(e, left, right, capacity, &here);
 }
 

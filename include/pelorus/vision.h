@@ -206,6 +206,17 @@ typedef struct plr_vision_sizes {
     uint32_t bytes, real, pixels, tracks, levels;
 } plr_vision_sizes;
 
+/* Returns those of this compiler run, for a struct of so many bytes. */
+static inline plr_vision_sizes plr_vision_sizes_here(uint32_t bytes) {
+    plr_vision_sizes here;
+    here.bytes = bytes;
+    here.real = PLR_REAL;
+    here.pixels = PLR_VISION_PIXELS;
+    here.tracks = PLR_VISION_TRACKS;
+    here.levels = PLR_VISION_LEVELS;
+    return here;
+}
+
 /* plr_vision_init for a caller whose compiled-in sizes are given; use plr_vision_init. */
 plr_status plr_vision_init_sized(plr_vision *v, const plr_rig *rig, const plr_vision_sizes *caller);
 
@@ -215,12 +226,7 @@ plr_status plr_vision_init_sized(plr_vision *v, const plr_rig *rig, const plr_vi
  * cameras that do not stand side by side with the second on the right, or a rotation that is none;
  * PLR_E_SIZE the caller was compiled with other sizes. */
 static inline plr_status plr_vision_init(plr_vision *v, const plr_rig *rig) {
-    plr_vision_sizes here;
-    here.bytes = (uint32_t)sizeof(plr_vision);
-    here.real = PLR_REAL;
-    here.pixels = PLR_VISION_PIXELS;
-    here.tracks = PLR_VISION_TRACKS;
-    here.levels = PLR_VISION_LEVELS;
+    const plr_vision_sizes here = plr_vision_sizes_here((uint32_t)sizeof(plr_vision));
     return plr_vision_init_sized(v, rig, &here);
 }
 

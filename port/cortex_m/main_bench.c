@@ -26,19 +26,6 @@ static plr_observation observations[PLR_MAX_OBSERVATIONS];
 static plr_report report;
 static text line;
 
-static void put_line(void) {
-    text_add(&line, "\n");
-    serial_panic((const uint8_t *)line.characters, line.length);
-    text_clear(&line);
-}
-
-static void add_field(const char *name, uint64_t number) {
-    text_add(&line, name);
-    text_add(&line, " ");
-    text_add_number(&line, number);
-    text_add(&line, " ");
-}
-
 static void begin(const plr_header *header) {
     plr_config config;
     plr_config_default(&config);
@@ -55,11 +42,11 @@ static void begin(const plr_header *header) {
     }
     config.calibrate = BENCH_CALIBRATE;
     config.camera_clock_sigma_s = (BENCH_CALIBRATE & PLR_CALIBRATE_CLOCK) != 0 ? 0.005 : 0.0;
-    add_field("process", header->process);
-    put_line();
+    text_add_field(&line, "process", header->process);
+    text_put_line(&line);
     if (plr_filter_init(&filter, &header->calibration, &config, NULL) != PLR_OK) {
         text_add(&line, "error: the filter refuses the recording's HEADER");
-        put_line();
+        text_put_line(&line);
     }
 }
 
@@ -81,7 +68,7 @@ static void start(const plr_start *given) {
     }
     if (status != PLR_OK) {
         text_add(&line, "error: the filter refuses the recording's START");
-        put_line();
+        text_put_line(&line);
     }
 }
 
@@ -95,8 +82,8 @@ static void time_predict(const plr_twist_message *twist) {
     const plr_status status = plr_filter_predict(&filter, twist->t_ns, &twist->twist);
     const uint32_t clocks = clocks_since(start);
     if (status == PLR_OK) {
-        add_field("predict", clocks);
-        put_line();
+        text_add_field(&line, "predict", clocks);
+        text_put_line(&line);
     }
 }
 
@@ -107,8 +94,8 @@ static void time_readings(const plr_imu_message *imu) {
         const plr_status status = plr_filter_inertial(&filter, t_ns, &imu->readings[i]);
         const uint32_t clocks = clocks_since(start);
         if (status == PLR_OK) {
-            add_field("reading", clocks);
-            put_line();
+            text_add_field(&line, "reading", clocks);
+            text_put_line(&line);
         }
     }
 }
@@ -118,14 +105,14 @@ static void time_update(const plr_frame *frame) {
     const plr_status status = plr_filter_update(&filter, frame, &report);
     const uint32_t clocks = clocks_since(start);
     if (status == PLR_OK) {
-        add_field("update", clocks);
-        add_field("observations", report.observations);
-        add_field("matched", report.matched);
-        add_field("used", report.used);
-        add_field("created", report.created);
-        add_field("evicted", report.evicted);
-        add_field("active", report.active);
-        put_line();
+        text_add_field(&line, "update", clocks);
+        text_add_field(&line, "observations", report.observations);
+        text_add_field(&line, "matched", report.matched);
+        text_add_field(&line, "used", report.used);
+        text_add_field(&line, "created", report.created);
+        text_add_field(&line, "evicted", report.evicted);
+        text_add_field(&line, "active", report.active);
+        text_put_line(&line);
     }
 }
 
@@ -167,10 +154,10 @@ static void replay(void) {
 }
 
 static void put_sizes(void) {
-    add_field("size filter", sizeof(plr_filter));
-    add_field("session", sizeof(plr_session));
-    add_field("hz", board_core_hz());
-    put_line();
+    text_add_field(&line, "size filter", sizeof(plr_filter));
+    text_add_field(&line, "session", sizeof(plr_session));
+    text_add_field(&line, "hz", board_core_hz());
+    text_put_line(&line);
 }
 
 int main(void) {
@@ -180,8 +167,8 @@ int main(void) {
     SYST_CSR = SYST_CSR_ENABLE | SYST_CSR_CORE_CLOCK; /* counts, and does not interrupt */
     put_sizes();
     replay();
-    add_field("done stack", stack_used());
-    put_line();
+    text_add_field(&line, "done stack", stack_used());
+    text_put_line(&line);
     for (;;) {
         board_watchdog_feed();
     }

@@ -28,19 +28,6 @@ static uint32_t look_clocks, look_ended;
 static const plr_eyes_calls *calls;
 static text line;
 
-static void put_line(void) {
-    text_add(&line, "\n");
-    serial_panic((const uint8_t *)line.characters, line.length);
-    text_clear(&line);
-}
-
-static void add_field(const char *name, uint64_t number) {
-    text_add(&line, name);
-    text_add(&line, " ");
-    text_add_number(&line, number);
-    text_add(&line, " ");
-}
-
 static int read_recording(void *context, uint8_t *bytes, size_t n) {
     const size_t left = (size_t)(bench_recording_end - at), taken = n < left ? n : left;
     (void)context;
@@ -80,24 +67,24 @@ static uint32_t crc_of_frame(const plr_frame *frame) {
 static void on_frame(void *context, const plr_frame_result *result) {
     const uint32_t update = (look_ended - SYST_CVR) & SYST_MAX;
     (void)context;
-    add_field("pair", result->frame->t_ns);
-    add_field("look", look_clocks);
-    add_field("update", update);
-    add_field("observations", result->frame->count);
-    add_field("used", result->report->used);
-    add_field("seen", crc_of_frame(result->frame));
-    add_field("pose", result->pose != NULL ? crc_of_pose(result->pose) : 0);
-    put_line();
+    text_add_field(&line, "pair", result->frame->t_ns);
+    text_add_field(&line, "look", look_clocks);
+    text_add_field(&line, "update", update);
+    text_add_field(&line, "observations", result->frame->count);
+    text_add_field(&line, "used", result->report->used);
+    text_add_field(&line, "seen", crc_of_frame(result->frame));
+    text_add_field(&line, "pose", result->pose != NULL ? crc_of_pose(result->pose) : 0);
+    text_put_line(&line);
 }
 
 static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
                        const plr_setting *culprit) {
     (void)context;
     (void)culprit;
-    add_field("refused", (uint64_t)subject);
-    add_field("at", t_ns);
+    text_add_field(&line, "refused", (uint64_t)subject);
+    text_add_field(&line, "at", t_ns);
     text_add(&line, plr_status_text(status));
-    put_line();
+    text_put_line(&line);
 }
 
 int main(void) {
@@ -120,19 +107,19 @@ int main(void) {
         timed.look = timed_look;
         options.eyes->calls = &timed;
     }
-    add_field("size eyes", sizeof(plr_eyes));
-    add_field("session", sizeof(plr_session));
-    add_field("pixels", PLR_VISION_PIXELS);
-    add_field("hz", board_core_hz());
-    put_line();
+    text_add_field(&line, "size eyes", sizeof(plr_eyes));
+    text_add_field(&line, "session", sizeof(plr_session));
+    text_add_field(&line, "pixels", PLR_VISION_PIXELS);
+    text_add_field(&line, "hz", board_core_hz());
+    text_put_line(&line);
     at = bench_recording;
     if (plr_session_init(&session, &port, &options) != PLR_OK) {
         return 1;
     }
     while (plr_session_step(&session) != PLR_STEP_CLOSED) {
     }
-    add_field("done stack", stack_used());
-    put_line();
+    text_add_field(&line, "done stack", stack_used());
+    text_put_line(&line);
     for (;;) {
         board_watchdog_feed();
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "text.h"
 
+#include "serial.h"
+
 void text_clear(text *t) {
     t->length = 0;
     t->characters[0] = '\0';
@@ -36,4 +38,17 @@ void text_add_hex(text *t, uint32_t number) {
     for (int shift = 28; shift >= 0; shift -= 4) {
         add_character(t, "0123456789abcdef"[(number >> shift) & 15]);
     }
+}
+
+void text_add_field(text *t, const char *name, uint64_t number) {
+    text_add(t, name);
+    text_add(t, " ");
+    text_add_number(t, number);
+    text_add(t, " ");
+}
+
+void text_put_line(text *t) {
+    text_add(t, "\n");
+    serial_panic((const uint8_t *)t->characters, t->length);
+    text_clear(t);
 }

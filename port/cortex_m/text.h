@@ -14,6 +14,10 @@ typedef struct text {
 void text_clear(text *t);
 void text_add(text *t, const char *words);
 void text_add_number(text *t, uint64_t number);
-void text_add_hex(text *t, uint32_t number); /* as 0x and eight digits */
+void text_add_hex(text *t, uint32_t number);                     /* as 0x and eight digits */
+void text_add_field(text *t, const char *name, uint64_t number); /* "name number " */
+
+/* Ends the line, writes it to the link and clears it. */
+void text_put_line(text *t);
 
 #endif

@@ -198,8 +198,7 @@ static void moved(plr_eyes *e, plr_time_ns t_ns, const plr_twist *velocity) {
 plr_status plr_eyes_init_sized(plr_eyes *e, uint8_t *left, uint8_t *right, uint32_t capacity,
                                const plr_vision_sizes *caller) {
     static const plr_eyes_calls calls = {clear, same_rig, begin, moved, take, look};
-    const plr_vision_sizes own = {sizeof(plr_eyes), PLR_REAL, PLR_VISION_PIXELS, PLR_VISION_TRACKS,
-                                  PLR_VISION_LEVELS};
+    const plr_vision_sizes own = plr_vision_sizes_here((uint32_t)sizeof(plr_eyes));
     if (!e || !caller || (capacity > 0 && (!left || !right)))
         return PLR_E_ARGUMENT;
     if (memcmp(&own, caller, sizeof own) != 0)

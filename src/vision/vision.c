@@ -23,15 +23,9 @@ enum {
 
 /* --- life --- */
 
-static plr_vision_sizes own_sizes(void) {
-    const plr_vision_sizes sizes = {sizeof(plr_vision), PLR_REAL, PLR_VISION_PIXELS,
-                                    PLR_VISION_TRACKS, PLR_VISION_LEVELS};
-    return sizes;
-}
-
 plr_status plr_vision_init_sized(plr_vision *v, const plr_rig *rig,
                                  const plr_vision_sizes *caller) {
-    const plr_vision_sizes own = own_sizes();
+    const plr_vision_sizes own = plr_vision_sizes_here((uint32_t)sizeof(plr_vision));
     if (!v || !rig || !caller)
         return PLR_E_ARGUMENT;
     if (memcmp(&own, caller, sizeof own) != 0)

@@ -8,7 +8,6 @@ Prints instructions of each pair and what both saw; exit status 1 where one bit 
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 import tempfile
@@ -17,15 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pelorus.errors import PelorusError
-from pelorus.robot.emulator import Emulator
 from pelorus.wire.frames import Pose, Stereo
 from pelorus.wire.framing import messages_of
 
-from firmware.sizes import BENCH_S, EMULATED_HZ, INSTRUCTIONS_PER_SECOND, fields
+from firmware.image import measured
 
 ROW = np.dtype([("id", "<u4"), ("pixels", "<f4", 4), ("sigma", "<f4")])
-REFUSED = re.compile(r"^refused .*$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -50,29 +46,15 @@ class Board:
 
 
 def on_board(board: str, image: Path) -> Board:
-    """Runs the image, an instruction a nanosecond."""
-    with Emulator(board, image, ("-icount", "shift=0")) as emulator:
-        link = emulator.connect()
-        text = b""
-        while not re.search(rb"done stack \d+ \n", text):
-            piece = link.exchange(b"", BENCH_S)
-            if not piece:
-                raise PelorusError(f"{image}: silent for {BENCH_S:.0f} s. {emulator.trouble()}")
-            text += piece
-        link.close()
-    if refused := REFUSED.search(text.decode()):
-        raise PelorusError(f"{image}: {refused[0]}")
-    first, *lines, last = text.decode().splitlines()
-    size = fields(first.removeprefix("size "))
-    per_clock = INSTRUCTIONS_PER_SECOND / EMULATED_HZ.get(board, size["hz"])
-    rows = [fields(line) for line in lines]
+    """Runs the image."""
+    found = measured(board, image)
     return Board(
-        [Pair(row["pair"], row["seen"], row["pose"]) for row in rows],
-        [row["look"] * per_clock for row in rows],
-        [row["update"] * per_clock for row in rows],
-        size["eyes"],
-        size["session"],
-        fields(last.removeprefix("done "))["stack"],
+        [Pair(row["pair"], row["seen"], row["pose"]) for row in found.rows],
+        [row["look"] * found.instructions_per_clock for row in found.rows],
+        [row["update"] * found.instructions_per_clock for row in found.rows],
+        found.sizes["eyes"],
+        found.sizes["session"],
+        found.stack_bytes,
     )
 
 

@@ -71,9 +71,8 @@ def recording(width: int, height: int, tracks: int, landmarks: int) -> Recording
         velocity=np.array([0, -SPEED_MPS, 0]), velocity_variance=np.full(3, 1e-4),
     )  # fmt: skip
     nothing = np.empty(0, np.int64)
-    none = Tracks.from_rows(0, nothing, nothing, np.empty((0, 4)))
     return Recording(
-        header, nothing, np.empty((0, 3)), np.empty((0, 3)), nothing, none, start=start,
+        header, nothing, np.empty((0, 3)), np.empty((0, 3)), nothing, Tracks.none(), start=start,
         inertial=Inertial(own, force, turn),
         # a board has no room for the clock's column, and the desk is to do without it, too
         settings={

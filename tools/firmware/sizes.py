@@ -11,7 +11,6 @@ the document's rows of these capacities. tools/sizes.sh calls them in order.
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -21,11 +20,12 @@ from statistics import median
 import numpy as np
 from pelorus.errors import PelorusError
 from pelorus.program.console import err, out, progress
-from pelorus.robot.emulator import MACHINES, Emulator
+from pelorus.robot.emulator import MACHINES
 from pelorus.wire.frames import Kind, Message, Stereo
 from pelorus.wire.framing import Writer, read_file
 from scipy.optimize import nnls
 
+from firmware.image import measured
 from firmware.stack import image_bound
 
 FRAME_OBSERVATIONS = 20
@@ -33,12 +33,8 @@ BUSY_OBSERVATIONS = 60
 # Of the two drives, which fit into a board's flash beside the filter, with some KB to spare.
 SECONDS = {FRAME_OBSERVATIONS: "12", BUSY_OBSERVATIONS: "10.5"}
 SEED = "31"
-BENCH_S = 1800.0  # against hangs
 TOLERANCE = 0.03
 PROCESSORS = {"mps2_an386": "m4f", "mps2_an500": "m7", "mps3_an547": "m55", "stm32f405": "m4f"}
-# QEMU's SysTick rates where the part's clock tree is not modelled.
-EMULATED_HZ = {"stm32f405": 168_000_000}
-INSTRUCTIONS_PER_SECOND = 1_000_000_000  # -icount shift=0: one a nanosecond
 
 
 @dataclass(frozen=True)
@@ -153,42 +149,22 @@ class Bench:
     run: Run
 
 
-def fields(line: str) -> dict[str, int]:
-    """Parses `name number name number ...`."""
-    words = line.split()
-    return {name: int(number) for name, number in zip(words[::2], words[1::2], strict=True)}
-
-
 def run_bench(board: str, image: Path) -> Bench:
-    """Runs the image with one instruction a nanosecond, and reads its lines."""
-    with Emulator(board, image, ("-icount", "shift=0")) as emulator:
-        link = emulator.connect()
-        text = b""
-        while not re.search(rb"done stack \d+ \n", text):
-            piece = link.exchange(b"", BENCH_S)
-            if not piece:
-                raise PelorusError(f"{image}: silent for {BENCH_S:.0f} s. {emulator.trouble()}")
-            text += piece
-            if said := re.search(rb"error: (.*)\n", text):
-                raise PelorusError(f"{image}: {said[1].decode().strip()}")
-        link.close()
-    first, *lines, last = text.decode().splitlines()
-    sizes = fields(first.removeprefix("size "))
-    per_clock = INSTRUCTIONS_PER_SECOND / EMULATED_HZ.get(board, sizes["hz"])
+    """Runs the image, and reads its lines."""
+    found = measured(board, image)
+    sizes, per_clock = found.sizes, found.instructions_per_clock
     run = Run()
     process = PROCESSES[0]
-    for line in lines:
-        found = fields(line)
-        if "process" in found:
-            process = PROCESSES[found["process"]]
-        elif process.step in found:
-            run.steps.append(found[process.step] * per_clock)
+    for row in found.rows:
+        if "process" in row:
+            process = PROCESSES[row["process"]]
+        elif process.step in row:
+            run.steps.append(row[process.step] * per_clock)
         else:
-            instructions = found.pop("update") * per_clock
-            found.pop("evicted")
-            run.updates.append(Update(instructions, **found))
-    stack = fields(last.removeprefix("done "))["stack"]
-    return Bench(sizes["filter"], sizes["session"], stack, run)
+            instructions = row.pop("update") * per_clock
+            row.pop("evicted")
+            run.updates.append(Update(instructions, **row))
+    return Bench(sizes["filter"], sizes["session"], found.stack_bytes, run)
 
 
 @dataclass(frozen=True)

@@ -142,9 +142,7 @@ def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) 
         f"no --stereo: {len(t_ns)} frames without a point, at the times of the other sensors' "
         "readings; the camera in the HEADER stands for none"
     )
-    nothing = np.empty(0, np.int64)
-    tracks = Tracks(len(t_ns), nothing.astype(np.intp), nothing, np.empty((0, 4)))
-    return RawTracks(motion.where, t_ns, tracks)
+    return RawTracks(motion.where, t_ns, Tracks.none(len(t_ns)))
 
 
 # --- motion ---------------------------------------------------------------------------------------

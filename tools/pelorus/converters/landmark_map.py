@@ -55,9 +55,8 @@ def convert(source: Path, like: Path) -> Recording:
 
 def _without_data(header: Header, known: list[Landmark]) -> Recording:
     never: Times = np.empty(0, np.int64)
-    nothing = Tracks(0, np.empty(0, np.intp), never, np.empty((0, 4)))
     none = np.empty((0, 3))
-    return Recording(header, never, none, none, never, nothing, known=known)
+    return Recording(header, never, none, none, never, Tracks.none(), known=known)
 
 
 def _csv(path: Path) -> MapPoints:

@@ -46,7 +46,7 @@ def recording(found: Streams) -> Recording:
                 images.require_alike(where, picture, first)
             yield TimedPair(t, t, left, right)
 
-    none = Tracks.from_rows(0, np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 4)))
+    none = Tracks.none()
     of_tracks = replace(found, frames=RawTracks(frames.where[0], t_ns[:0], none))
     truth = None
     if found.truth is not None:

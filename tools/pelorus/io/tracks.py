@@ -80,6 +80,11 @@ class Tracks:
     sigma_px: Floats | None = None
 
     @classmethod
+    def none(cls, frame_count: int = 0) -> Tracks:
+        """Returns those of so many frames that see nothing."""
+        return cls(frame_count, np.empty(0, np.intp), np.empty(0, np.int64), np.empty((0, 4)))
+
+    @classmethod
     def from_rows(
         cls,
         frame_count: int,
