@@ -24,7 +24,6 @@ from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import ADMITTED_AFTER, Tracker
 from pelorus.wire.layout import Floats
 
-POINTS = 100  # that own eyes follow: as many as a filter of the desk holds
 Motion = tuple[Floats, Floats]
 
 
@@ -54,9 +53,7 @@ class OwnEyes:
         header, rig = calibrated.header, calibrated.rig
         camera, size = header.camera, (header.image_width_px, header.image_height_px)
         self._tracker = (
-            own.Tracker.rectified(camera, *size, tracks=POINTS)
-            if rig is None
-            else own.Tracker(rig, tracks=POINTS, camera=camera)
+            own.Tracker.rectified(camera, *size) if rig is None else own.Tracker(rig, camera=camera)
         )
         if size[0] * size[1] > self._tracker.pixels_max:
             raise PelorusError(f"pictures of {size[0]} x {size[1]} pixels are too large")
