@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.live.camera import Camera, Force, Measured, Picture, Rate
 from pelorus.math import se3
@@ -34,7 +34,8 @@ def on_camera(mount: Sequence[float], header: Header) -> Poses:
     """Returns T_IB, of points of the base in the body of the filter. `mount` says where the left
     camera sits on the base: m forward, left, up; roll, pitch, yaw in degrees, pitch > 0 down."""
     T_BF = Poses(
-        Rotation.from_euler("ZYX", mount[:2:-1], degrees=True).as_matrix(), np.array(mount[:3])
+        scipy.spatial.transform.Rotation.from_euler("ZYX", mount[:2:-1], degrees=True).as_matrix(),
+        np.array(mount[:3]),
     )
     T_IC = se3.inverse(Poses(np.asarray(header.R_CB), np.asarray(header.t_CB_m)))
     return se3.compose(se3.compose(T_IC, CAMERA_FROM_FLU), se3.inverse(T_BF))
