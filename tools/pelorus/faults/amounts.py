@@ -219,7 +219,9 @@ def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
         )
         if not by_imu:
             words += _timing(recording, offset) + _or_turns(agreed)
-        yield Fault("clock", words, stops=False, grave=False, ratio=(offset / sigma) ** 2)
+        settings = {"camera-offset": f"{offset:.3g}"}
+        ratio = (offset / sigma) ** 2
+        yield Fault("clock", words, stops=False, grave=False, ratio=ratio, settings=settings)
     if apart:
         yield Fault(
             "clock-turns",
