@@ -14,7 +14,7 @@ import cv2
 import hero
 import numpy as np
 import street
-from pelorus import Calibration, Tracker
+from pelorus import Tracker
 from pelorus.io.tracks import Tracks
 
 FRAMES, SHOWN, POINTS = 40, (12, 39), 100
@@ -22,9 +22,7 @@ FRAMES, SHOWN, POINTS = 40, (12, 39), 100
 
 def main() -> None:
     """Follows, draws, writes."""
-    cx, cy = (street.WIDTH - 1) / 2, (street.HEIGHT - 1) / 2
-    camera = Calibration(street.FOCAL, street.FOCAL, cx, cy, street.BASELINE_M, hero.R_CB)
-    tracker = Tracker.rectified(camera, street.WIDTH, street.HEIGHT, tracks=POINTS)
+    tracker = Tracker.rectified(hero.camera(), street.WIDTH, street.HEIGHT, tracks=POINTS)
     pairs = hero.rendered()[:FRAMES]
     bodies = [hero.body(k / hero.RATE_HZ) for k in range(FRAMES)]
     seen = []

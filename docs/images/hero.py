@@ -87,22 +87,30 @@ def body(t_s: float) -> tuple[Floats, Floats]:
     return R, np.array([x, y, HEIGHT_M + 0.015 * np.sin(9.0 * t_s + 0.5)])
 
 
-def rendered() -> list[tuple[Pixels, Pixels]]:
-    """Left and right, in colour."""
-    KEPT.mkdir(parents=True, exist_ok=True)
+def eyes_of(t_s: float, side: int, shutter_s: float) -> tuple[Floats, Floats]:
+    """R_WC, p_WC of the left or right camera; of each rendered row, if they are read in succession."""
+    rows = street.HEIGHT * street.OVERSAMPLED
+    late = np.linspace(-0.5, 0.5, rows) * shutter_s if shutter_s else np.zeros(1)
+    bodies = [body(t_s + float(dt)) for dt in late]
+    R = np.array([R_WB @ R_CB.T for R_WB, _ in bodies])
+    p = np.array([p_WB for _, p_WB in bodies]) + side * street.BASELINE_M * R[..., 0]
+    return (R, p) if shutter_s else (R[0], p[0])
+
+
+def rendered(kept: Path = KEPT, shutter_s: float = 0) -> list[tuple[Pixels, Pixels]]:
+    """Left and right, in colour; a rolling shutter's middle row is of the frame's time."""
+    kept.mkdir(parents=True, exist_ok=True)
     scene = None
     pairs = []
     for k in range(FRAMES):
-        R, p = body(k / RATE_HZ)
-        R_WC = R @ R_CB.T
         pair = []
         for side, name in enumerate(("left", "right")):
-            file = KEPT / f"{name}-{k:03}.png"
+            file = kept / f"{name}-{k:03}.png"
             if not file.exists():
                 scene = scene or street.Street()
                 rng = np.random.default_rng([k, side])
-                eye = p + side * street.BASELINE_M * R_WC[:, 0]
-                Image.fromarray(scene.picture(R_WC, eye, rng)).save(file)
+                picture = scene.picture(*eyes_of(k / RATE_HZ, side, shutter_s), rng)
+                Image.fromarray(picture).save(file)
                 print(f"\rrendered {k + 1} of {FRAMES}", end="", flush=True)
             pair.append(np.asarray(Image.open(file)))
         pairs.append((pair[0], pair[1]))
@@ -130,30 +138,42 @@ class Run:
     left_behind: list[Floats]  # those that left the state
 
 
-def drive(tracks: Tracks) -> Run:
-    """The filter's way, and that of the odometry alone."""
-    rng = np.random.default_rng(3)
-    cx, cy = (street.WIDTH - 1) / 2, (street.HEIGHT - 1) / 2
-    camera = Calibration(street.FOCAL, street.FOCAL, cx, cy, street.BASELINE_M, R_CB)
-    filter = Filter(camera, CONFIG)
-    alone = Filter(camera, CONFIG | {"mode": "dead_reckoning"})
-    for one in (filter, alone):
-        one.set_pose(0, *body(0.0))
-    bounds = tracks.bounds()
-    rows = []
+def twists(seed: int) -> list[list[tuple[int, Floats, Floats]]]:
+    """Time in ns, v and w of each step before each frame, with noise and biases."""
+    rng = np.random.default_rng(seed)
+    frames: list[list[tuple[int, Floats, Floats]]] = []
     for k in range(FRAMES):
-        t_ns = k * 10**9 // RATE_HZ
+        frames.append([])
         for i in range(TWISTS_PER_FRAME if k else 0):
             begin, step = (k - 1 + i / TWISTS_PER_FRAME) / RATE_HZ, 1 / RATE_HZ / TWISTS_PER_FRAME
             (R0, p0), (R1, p1) = body(begin), body(begin + step)
             w = Rotation.from_matrix(R0.T @ R1).as_rotvec() / step
             v = Rotation.from_rotvec(w * step / 2).as_matrix().T @ R0.T @ (p1 - p0) / step
-            v, w = (
-                v + BIAS_V + rng.normal(0, VELOCITY_SIGMA, 3),
-                w + BIAS_W + rng.normal(0, GYRO_SIGMA, 3),
-            )
-            for one in (filter, alone):
-                one.predict(round(begin * 1e9), v, w)
+            v = v + BIAS_V + rng.normal(0, VELOCITY_SIGMA, 3)
+            w = w + BIAS_W + rng.normal(0, GYRO_SIGMA, 3)
+            frames[-1].append((round(begin * 1e9), v, w))
+    return frames
+
+
+def camera() -> Calibration:
+    """The rendered pair."""
+    cx, cy = (street.WIDTH - 1) / 2, (street.HEIGHT - 1) / 2
+    return Calibration(street.FOCAL, street.FOCAL, cx, cy, street.BASELINE_M, R_CB)
+
+
+def drive(tracks: Tracks, seed: int = 3) -> Run:
+    """The filter's way, and that of the odometry alone."""
+    filter = Filter(camera(), CONFIG)
+    alone = Filter(camera(), CONFIG | {"mode": "dead_reckoning"})
+    for one in (filter, alone):
+        one.set_pose(0, *body(0.0))
+    bounds = tracks.bounds()
+    rows = []
+    for k, steps in enumerate(twists(seed)):
+        t_ns = k * 10**9 // RATE_HZ
+        for one in (filter, alone):
+            for step in steps:
+                one.predict(*step)
         now = slice(int(bounds[k]), int(bounds[k + 1]))
         filter.update(t_ns, observations(tracks.id[now], tracks.pixels[now]))
         alone.update(t_ns, observations([], np.empty((0, 4))))

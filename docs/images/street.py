@@ -166,8 +166,8 @@ def block() -> list[Box]:
 class Camera:
     """Of the picture before it is made smaller."""
 
-    R: Floats  # to the world
-    p: Floats
+    R: Floats  # to the world; (3, 3), or of each row of a rolling shutter, (h, 3, 3)
+    p: Floats  # (3,) or (h, 3)
     width: int = WIDTH * OVERSAMPLED
     height: int = HEIGHT * OVERSAMPLED
     focal: float = FOCAL * OVERSAMPLED
@@ -178,10 +178,18 @@ class Camera:
             np.arange(self.width, dtype=np.float32), np.arange(self.height, dtype=np.float32)
         )
         x, y = (u - (self.width - 1) / 2) / self.focal, (v - (self.height - 1) / 2) / self.focal
-        return np.asarray(np.stack((x, y, np.ones_like(u)), axis=-1) @ self.R.T, np.float32)
+        return np.asarray(
+            np.stack((x, y, np.ones_like(u)), axis=-1) @ self.R.swapaxes(-1, -2), np.float32
+        )
+
+    def eyes(self) -> Floats:
+        """(h, 1, 3), in the world: whence each row is seen."""
+        return np.broadcast_to(self.p, (self.height, 3))[:, None]
 
     def window_of(self, face: Face) -> tuple[slice, slice] | None:
         """The part of the picture in which a face may be seen."""
+        if self.p.ndim > 1:
+            return slice(None), slice(None)
         corners = np.empty((4, 3), np.float32)
         corners[:, face.axis] = face.at
         corners[:, face.others] = [
@@ -236,7 +244,7 @@ class Street:
         return np.stack((cv2.GaussianBlur(sun, (0, 0), 0.7), sky), axis=-1).astype(np.float32)
 
     def picture(self, R_WC: Floats, p_WC: Floats, rng: np.random.Generator) -> NDArray[np.uint8]:
-        """(HEIGHT, WIDTH, 3), RGB."""
+        """(HEIGHT, WIDTH, 3), RGB; a pose for all, or one for each row before it is made smaller."""
         camera = Camera(np.float32(R_WC), np.float32(p_WC))
         rays = camera.rays()
         depth, which = (
@@ -244,14 +252,15 @@ class Street:
             np.full(rays.shape[:2], -1, np.int16),
         )
         for k, face in enumerate(self.faces):
-            if (camera.p[face.axis] - face.at) * face.outwards > 0:
+            if ((camera.p[..., face.axis] - face.at) * face.outwards > 0).all():
                 self._cover(k, face, camera, rays, depth, which)
         out = np.empty((*depth.shape, 3), np.float32)
         if (which < 0).any():
             out[which < 0] = self._sky(rays[which < 0])
         for k in np.unique(which[which >= 0]):
             seen = which == k
-            out[seen] = self._shade(self.faces[k], camera, rays[seen], depth[seen])
+            points = np.broadcast_to(camera.eyes(), rays.shape)[seen] + depth[seen, None] * rays[seen]
+            out[seen] = self._shade(self.faces[k], camera, points, rays[seen], depth[seen])
         small = cv2.resize(out, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
         bright = 255 * np.clip(small, 0, 1) ** (1 / 1.6) + rng.normal(0, NOISE, small.shape)
         return np.clip(np.round(bright), 0, 255).astype(np.uint8)
@@ -263,17 +272,18 @@ class Street:
         window = camera.window_of(face)
         if window is None:
             return
-        rays, eye = rays[window], camera.p
+        rays, eye = rays[window], camera.eyes()[window[0]]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            t = (face.at - eye[face.axis]) / rays[..., face.axis]
+            t = (face.at - eye[..., face.axis]) / rays[..., face.axis]
             ahead = (t > 0.05) & (t < depth[window])
             for i, low, high in zip(face.others, face.low, face.high, strict=True):
-                x = eye[i] + t * rays[..., i]
+                x = eye[..., i] + t * rays[..., i]
                 ahead &= (x >= low) & (x <= high)
         depth[window][ahead], which[window][ahead] = t[ahead], k
 
-    def _shade(self, face: Face, camera: Camera, rays: Floats, t: Floats) -> Floats:
-        points = camera.p + t[:, None] * rays
+    def _shade(
+        self, face: Face, camera: Camera, points: Floats, rays: Floats, t: Floats
+    ) -> Floats:
         a, b = (points[:, i] for i in face.others)
         texture = self.levels[face.texture]
         metres = texture[0].shape[0] / TEXELS_PER_M

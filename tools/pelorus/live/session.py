@@ -16,6 +16,7 @@ from pelorus.math.se3 import Poses
 from pelorus.native.binding import Precision
 from pelorus.native.configured import Named
 from pelorus.online import diagnosis
+from pelorus.online.choice import Kind
 from pelorus.online.diagnosis import Level, Status
 from pelorus.online.drive import Setup
 from pelorus.online.eyes import Seen
@@ -46,6 +47,7 @@ class How:
 
     mount: tuple[float, ...] = HERE
     within_ms: float = 2.0
+    eyes: Kind = "own"
     settings: Named = field(default_factory=dict)
     precision: Precision = "float32"
     log: Path | None = None
@@ -57,7 +59,7 @@ class Session:
 
     def __init__(self, camera: Camera, how: How) -> None:
         self.camera = camera
-        self.pipeline = Pipeline(round(how.within_ms * 1e6), REMEDY_FOR_G)
+        self.pipeline = Pipeline(round(how.within_ms * 1e6), REMEDY_FOR_G, how.eyes)
         header = header_of(camera.calibrated, camera.inertial)
         self.pipeline.calibrated = replace(camera.calibrated, header=header)
         setup = Setup(header, how.settings, how.precision)
