@@ -82,20 +82,42 @@ static plr_status covariance_after(double P[36], const plr_filter *f, double sec
     return PLR_OK;
 }
 
-void plr_reanchor_tell_counter(plr_text *line, plr_time_ns from_ns, plr_time_ns to_ns) {
-    static const struct {
-        uint64_t ns;
-        const char *name;
-    } units[] = {{1, "nanoseconds"}, {1000, "microseconds"}, {1000000, "milliseconds"}};
-    const plr_time_ns near_ns = UINT64_C(1000000000);
-    for (unsigned i = 0; i < sizeof units / sizeof *units; i++) {
-        const plr_time_ns round_ns = units[i].ns << 32;
-        if (from_ns <= to_ns || distance_ns(from_ns - to_ns, round_ns) > near_ns)
-            continue;
-        plr_line_text(line, ". So do 32-bit ");
-        plr_line_text(line, units[i].name);
-        plr_line_text(line, " that wrap: count in 64 bits");
+/* Units of the counters of 32 bits that senders count in. */
+static const struct {
+    uint64_t ns;
+    const char *name;
+} counters[] = {{1, "nanoseconds"}, {1000, "microseconds"}, {1000000, "milliseconds"}};
+#define COUNTERS (sizeof counters / sizeof *counters)
+#define NEAR_NS  UINT64_C(1000000000)
+
+/* The counter that goes round from `from_ns` to `to_ns`, or COUNTERS; `left_ns` went by then. */
+static unsigned counter_that_wraps(plr_time_ns from_ns, plr_time_ns to_ns, plr_time_ns *left_ns) {
+    for (unsigned i = 0; i < COUNTERS; i++) {
+        *left_ns =
+            from_ns > to_ns ? distance_ns(from_ns - to_ns, counters[i].ns << 32) : UINT64_MAX;
+        if (*left_ns <= NEAR_NS)
+            return i;
     }
+    return COUNTERS;
+}
+
+void plr_reanchor_tell_counter(plr_text *line, plr_time_ns from_ns, plr_time_ns to_ns) {
+    plr_time_ns left_ns;
+    const unsigned i = counter_that_wraps(from_ns, to_ns, &left_ns);
+    if (i == COUNTERS)
+        return;
+    plr_line_text(line, ". So do 32-bit ");
+    plr_line_text(line, counters[i].name);
+    plr_line_text(line, " that wrap: count in 64 bits");
+}
+
+/* The time that went by, as far as a clock that jumped tells it: where a counter went round what
+ * is left of its round, else all that it jumped. Four seconds, the round of nanoseconds, may be
+ * chance; 71 minutes to a second are none. */
+static double gone_by_s(plr_time_ns from_ns, plr_time_ns to_ns) {
+    plr_time_ns left_ns;
+    const unsigned i = counter_that_wraps(from_ns, to_ns, &left_ns);
+    return (double)(i > 0 && i < COUNTERS ? left_ns : distance_ns(from_ns, to_ns)) * 1e-9;
 }
 
 static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
@@ -159,7 +181,7 @@ static plr_status reanchor(plr_session *s, plr_time_ns t_ns) {
     (void)plr_filter_flush_map(f); /* the session's sink accepts all */
     const plr_status status = plr_filter_config(f)->mode == PLR_MODE_MAPPING
                                   ? plr_filter_reset(f)
-                                  : carry_pose(s, t_ns, (double)distance_ns(from_ns, t_ns) * 1e-9);
+                                  : carry_pose(s, t_ns, gone_by_s(from_ns, t_ns));
     if (status == PLR_OK) {
         s->totals.reanchored++;
         report(s, from_ns, t_ns);

@@ -35,7 +35,7 @@ ROOMS: dict[str, str] = {
     "robot": "errors wire",
     "faults": "program wire math io evaluate tracking",
     "converters": "errors program wire math io evaluate tracking rig tracker faults",
-    "online": "errors wire math io evaluate tracking rig native filter faults converters",
+    "online": "errors wire math io evaluate tracking rig native filter tracker faults converters",
     "live": "errors program wire math io evaluate tracking rig native robot converters online",
     "check": "errors program wire math io evaluate tracking native faults converters",
     "explain": "errors wire math io evaluate tracking check",

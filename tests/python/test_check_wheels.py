@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Wheels beside an IMU: `pelorus check` tells a wrong radius and a wrong distance, `explain` that
-they slip.
+"""Wheels beside an IMU: a wrong radius and a wrong distance are faults with one verdict, a slip is
+an event of `explain`.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus.check import wheels
-from pelorus.check.verdict import Grade, Remark
+from converted import Run
+from pelorus.check.contents import recording_of
 from pelorus.explain import explain
 from pelorus.explain.incident import Cause
+from pelorus.faults.fault import Fault
+from pelorus.faults.named import judged_of
 from pelorus.io.recording import Recording
 from pelorus.native.replay import replayed
 from pelorus.simulate.imu import SimulatedImu
@@ -23,69 +27,95 @@ from pelorus.wire.frames import Reading
 from replay_drive import BIN
 
 HALF_M = 0.25  # of the track
+OPTIONS = Options(
+    duration_s=60.0,
+    speed_mps=1.0,
+    lap_s=20.0,
+    imu=SimulatedImu(imu_rate_hz=200.0, rest_s=2.0),
+    readings={"wheel": Sensing(rate_hz=50.0, sigma=(0.03,))},
+)
 
 
 @pytest.fixture(scope="module")
 def drive() -> Recording:
     """A minute at 1 m/s, round and round."""
-    imu = SimulatedImu(imu_rate_hz=200.0, rest_s=2.0)
-    sensing = {"wheel": Sensing(rate_hz=50.0, sigma=(0.03,))}
-    options = Options(duration_s=60.0, speed_mps=1.0, lap_s=20.0, imu=imu, readings=sensing)
-    return simulate(options).recording
+    return simulate(OPTIONS).recording
 
 
-def said(drive: Recording, readings: Sequence[Reading]) -> list[Remark]:
-    program = BIN / "pelorus-replay"
-    if not program.exists():
-        pytest.skip(f"{program} is not built")
+def found(drive: Recording, readings: Sequence[Reading]) -> dict[str, Fault]:
+    """Returns the faults of the wheels, by name."""
     messages = list(replace(drive, readings=list(readings)).messages())
-    return wheels.remarks(program, messages, {})
+    faults = judged_of(messages, recording_of(messages)).faults
+    assert all(fault.name.startswith("wheel-") for fault in faults)
+    assert not any(fault.stops or fault.grave for fault in faults)
+    return {fault.name: fault for fault in faults}
 
 
 def scaled(readings: Sequence[Reading], by: float) -> list[Reading]:
     return [replace(reading, value=by * reading.value) for reading in readings]
 
 
-def test_a_true_scale_is_no_reason_for_care(drive: Recording) -> None:
-    (remark,) = said(drive, drive.readings)
-    assert remark.grade is Grade.GOOD
-    assert remark.text.startswith("the wheels: against pictures and IMU the speed is ")
-    assert said(drive, []) == []
-
-
-def test_a_wrong_radius_is_told_to_a_third_of_a_percent_though_the_wheels_slip(
-    drive: Recording,
-) -> None:
-    readings = scaled(drive.readings, 1.03)
-    readings[500:700] = scaled(readings[500:700], 0.5)
-    (remark,) = said(drive, readings)
-    assert remark.grade is Grade.CARE
-    divisor = float(remark.text.rpartition("by ")[2].rstrip(")"))
-    assert divisor == pytest.approx(1.03, abs=0.003)
-
-
-def test_wheels_that_stand_elsewhere_than_was_told_are_named(drive: Recording) -> None:
+def pair(drive: Recording, apart: float) -> list[Reading]:
+    """Returns readings of two wheels that are `apart` times as far apart as is told."""
     truth, t_ns = drive.truth, drive.truth_t_ns
     heading = np.unwrap(np.arctan2(truth.R[:, 1, 0], truth.R[:, 0, 0]))
     turning = np.gradient(heading, t_ns * 1e-9)
+    return [
+        replace(m, value=m.value - [np.interp(m.t_ns, t_ns, turning) * y * apart, 0, 0],
+                at_B_m=np.array([0.0, y, 0.0]))
+        for m in drive.readings for y in (HALF_M, -HALF_M)
+    ]  # fmt: skip
 
-    def wheel(told_m: float, true_m: float) -> list[Reading]:
-        at = np.array([0.0, told_m, 0.0])
-        return [
-            replace(m, value=m.value - [np.interp(m.t_ns, t_ns, turning) * true_m, 0, 0], at_B_m=at)
-            for m in drive.readings
-        ]
 
-    remarks = said(drive, [*wheel(HALF_M, 1.6 * HALF_M), *wheel(-HALF_M, -HALF_M)])
-    far = [one.text for one in remarks if "distance of the wheels" in one.text]
-    assert len(far) == 1
-    assert far[0].startswith("the wheel at y = 0.25 m: by its readings it sits at y = 0.")
-    assert float(far[0].partition("sits at y = ")[2].split()[0]) == pytest.approx(0.4, abs=0.06)
+def test_true_wheels_are_no_fault(drive: Recording) -> None:
+    assert found(drive, []) == {}
+    assert found(drive, drive.readings) == {}
+    assert found(drive, pair(drive, 1.0)) == {}
+
+
+@pytest.mark.parametrize("by", [0.94, 1.03])
+def test_a_wrong_radius_is_told_to_half_a_percent_though_the_wheels_slip(
+    by: float, drive: Recording
+) -> None:
+    readings = scaled(drive.readings, by)
+    readings[500:700] = scaled(readings[500:700], 0.5)
+    (fault,) = found(drive, readings).values()
+    assert fault.name == "wheel-scale"
+    assert ("smaller" if by > 1 else "larger") in fault.words
+    factor = float(fault.words.rpartition("multiply the speed by ")[2].partition(")")[0])
+    assert factor == pytest.approx(1 / by, abs=0.005)
+
+
+@pytest.mark.parametrize("apart", [0.8, 1.15])
+def test_wheels_that_are_farther_apart_than_was_told_are_named(
+    apart: float, drive: Recording
+) -> None:
+    (fault,) = found(drive, pair(drive, apart)).values()
+    assert fault.name == "wheel-track"
+    told = float(fault.words.partition("the wheels are ")[2].split()[0])
+    assert told == pytest.approx(apart, abs=0.03)
 
 
 def test_a_sigma_that_is_too_small_is_told(drive: Recording) -> None:
-    sure = [replace(m, sigma=0.2 * m.sigma) for m in drive.readings]
-    assert any("times their sigma: tell a larger one" in one.text for one in said(drive, sure))
+    (fault,) = found(drive, [replace(m, sigma=0.2 * m.sigma) for m in drive.readings]).values()
+    assert "times their sigma: tell a larger one" in fault.words
+
+
+def test_a_wrong_radius_has_one_verdict_in_every_command_until_the_filter_estimates_it(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    short = simulate(replace(OPTIONS, duration_s=24.0, seed=3)).recording
+    path, conf = tmp_path / "drive.plr", tmp_path / "tuned.conf"
+    replace(short, readings=scaled(short.readings, 1.06)).write(path)
+    before = json.loads(pelorus("explain", path, "--json").out)
+    assert any("times the wheels' speed" in words for words in before["why"])
+    assert before["what_to_set"]["calibrate"] == "wheel-scale"
+    said = pelorus("check", path, "--out", conf).out
+    assert f"with the settings as they are: {before['verdict']}" in said
+    assert "calibrate = wheel-scale" in conf.read_text()
+    after = json.loads(pelorus("explain", path, "--json", "--config", conf).out)
+    assert after["grade"] == "good"
+    assert said.startswith(after["verdict"])
 
 
 def test_wheels_that_slip_are_an_event_with_both_speeds(drive: Recording) -> None:

@@ -28,8 +28,9 @@ from pelorus.online.diagnosis import Level, Status
 from pelorus.rig.read import Calibrated
 from pelorus.simulate.imu import SimulatedImu
 from pelorus.simulate.simulate import Options, simulate
-from pelorus.wire.frames import Header, Imu, Pose, Stereo
+from pelorus.wire.frames import Config, Header, Imu, Pose, Stereo
 from pelorus.wire.framing import messages_of
+from pelorus.wire.settings import IDS
 from rendered import SMALL
 from room import Room
 from scipy.spatial.transform import Rotation
@@ -65,15 +66,16 @@ def words(text: str) -> str:
 # --- from a camera to a pose ----------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("eyes", ["own", "opencv"])
 def test_a_folder_as_a_camera_shows_a_pose_sends_it_and_keeps_a_log_that_replays(
-    once: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    once: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], eyes: str
 ) -> None:
     folder = once("room-short", Room(SMALL, drive_s=2.2).write)
     log, listener = tmp_path / "out.plr", socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     listener.bind(("127.0.0.1", 0))
     files = [f"--calibration={folder / name}" for name in ("camchain.yaml", "imu.yaml")]
     to = f"127.0.0.1:{listener.getsockname()[1]}"
-    how = ("--log", str(log), "--udp", to)
+    how = ("--log", str(log), "--udp", to, "--eyes", eyes)
     assert main(["live", "--camera", "folder", str(folder), *files, *how]) == 0
     said = capsys.readouterr().out
     assert " good " in said
@@ -83,6 +85,19 @@ def test_a_folder_as_a_camera_shows_a_pose_sends_it_and_keeps_a_log_that_replays
     assert len(told["covariance"]) == 36
     assert set(told) >= {"t_ns", "position_m", "orientation_xyzw", "velocity_mps", "health"}
     assert same_bits(log)
+
+
+def test_numbers_and_words_of_a_settings_file_are_in_force(
+    recording: Recording, tmp_path: Path
+) -> None:
+    source, log, conf = (tmp_path / name for name in ("in.plr", "out.plr", "rig.conf"))
+    recording.write(source)
+    conf.write_text("gyro-noise = 1.4e-3  # rad/s/sqrt(Hz)\nscene = may-move\n")
+    how = ["--config", str(conf), "--log", str(log)]
+    assert main(["live", "--camera", "plr", str(source), *how]) == 0
+    in_force = [m for m in messages_of(log) if isinstance(m, Config)][-1].settings
+    assert in_force[IDS["gyro-noise"]] == pytest.approx(1.4e-3)
+    assert in_force[IDS["scene"]] == 1
 
 
 def test_a_recording_as_a_camera_ends_where_the_truth_does(

@@ -237,8 +237,9 @@ static void test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was(v
 
 /* --- readings that nothing can be done with are told --- */
 
-/* From frame 15 on the IMU's clock has started again, by so many ns; the camera's goes on. */
-static void send_with_an_imu_that_starts_again(unsigned batch, plr_time_ns back_ns) {
+/* From frame 15 on the IMU's clock has started again, by so many ns; the camera's goes on, or
+ * starts again with it. */
+static void send_with_a_clock_that_starts_again(unsigned batch, plr_time_ns back_ns, bool both) {
     const plr_time_ns later_ns = back_ns + UINT64_C(5000000000);
     desk_begin();
     desk_send(inertial_header());
@@ -253,10 +254,32 @@ static void send_with_an_imu_that_starts_again(unsigned batch, plr_time_ns back_
         if (n % INERTIAL_PER_FRAME > 0)
             continue;
         plr_message frame = drive_stereo(INERTIAL_READING_S * n);
-        frame.as.stereo.t_ns += later_ns;
+        frame.as.stereo.t_ns += later_ns - (both && n > 15 * INERTIAL_PER_FRAME ? back_ns : 0);
         desk_send(frame);
     }
     desk_run();
+}
+
+static void test_where_both_clocks_wrap_the_pose_is_known_as_if_a_moment_had_gone_by(void) {
+    static const struct {
+        plr_time_ns back_ns;
+        double least_m, most_m;
+    } tried[] = {{UINT64_C(1000) << 32, 0, 2},         /* 71 minutes */
+                 {UINT64_C(3000000000000), 900, 1e4}}; /* 50 minutes: no counter's round */
+    for (unsigned i = 0; i < 2; i++) {
+        for (unsigned batch = 1; batch <= 5; batch += 4) {
+            double P[36];
+            desk_clear(1);
+            send_with_a_clock_that_starts_again(batch, tried[i].back_ns, true);
+            TEST_ASSERT_EQUAL_UINT32(1, session.totals.reanchored);
+            TEST_ASSERT_EQUAL_UINT(i == 0, desk_texts_with("32-bit microseconds that wrap"));
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P));
+            for (int k = 0; k < 3; k++) {
+                TEST_ASSERT_TRUE(P[7 * k] >= tried[i].least_m * tried[i].least_m);
+                TEST_ASSERT_TRUE(P[7 * k] < tried[i].most_m * tried[i].most_m);
+            }
+        }
+    }
 }
 
 static void test_an_imu_whose_clock_alone_starts_again_is_told_with_the_counter(void) {
@@ -269,12 +292,13 @@ static void test_an_imu_whose_clock_alone_starts_again_is_told_with_the_counter(
                  {UINT64_C(600000000000), "that wrap", false}};
     for (unsigned i = 0; i < 3; i++) {
         desk_clear(1);
-        send_with_an_imu_that_starts_again(5, tried[i].back_ns);
+        send_with_a_clock_that_starts_again(5, tried[i].back_ns, false);
         TEST_ASSERT_EQUAL_UINT(1, desk_texts_with("IMU readings are of another clock"));
         TEST_ASSERT_EQUAL_UINT(tried[i].named, desk_texts_with(tried[i].said));
         TEST_ASSERT_EQUAL_UINT32(0, session.totals.reanchored);
         desk_clear(1);
-        send_with_an_imu_that_starts_again(1, tried[i].back_ns); /* three before a frame comes */
+        send_with_a_clock_that_starts_again(1, tried[i].back_ns,
+                                            false); /* three before a frame comes */
         TEST_ASSERT_TRUE(session.totals.reanchored > 0);
         TEST_ASSERT_EQUAL_INT(tried[i].named, desk_texts_with(tried[i].said) > 0);
     }

@@ -55,6 +55,9 @@ KEPT = (
     "baseline-sigma",
     CAMERA_TURN,
     DRIFT,
+    "calibrate",
+    "wheel-scale-sigma",
+    "wheel-track-sigma",
 )
 
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pelorus.check import changes, wheels
+from pelorus.check import changes
 from pelorus.check.calibration import calibration
+from pelorus.check.covering import covering
 from pelorus.check.estimated import without_clock
 from pelorus.check.halves_alike import with_halves_alike
 from pelorus.check.held import held_against
@@ -106,9 +107,12 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
-    camera = calibration(known.agreed, run.messages).settings
-    if camera:  # no estimate changes by it, and each covariance
-        tuned = replace(tuned, settings=tuned.settings | camera)
+    asked = {
+        **calibration(known.agreed, run.messages).settings,
+        **covering(run.messages, known.faults),
+    }
+    if asked:
+        tuned = replace(tuned, settings=tuned.settings | asked)
         run = _whole(program, recording, tuned.settings, folder, "after") or run
     rows = [(title, figures.get(title, "-"), now) for title, now in _figures(run, truth).items()]
     cost = (
@@ -120,8 +124,6 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if len(spells) > SPELLS_SHOWN:
         spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
     notes = of_search(tuned)
-    if bench.by_imu:
-        notes += wheels.remarks(program, messages, tuned.settings)
     changed = given, bench.header, tuned, bench.by_imu
     return Checked(
         verdict_of(run, known),

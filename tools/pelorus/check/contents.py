@@ -52,6 +52,7 @@ def recording_of(messages: Sequence[Message], process: Process | None = None) ->
         np.array([m.t_ns for m in frames], np.int64),
         Tracks.from_rows(len(frames), frame[good], ids[good], pixels[good]),
         inertial=_in_order(readings) if by_imu else inertial.NO_READINGS,
+        readings=[m for m in messages if isinstance(m, Reading)],
     )
 
 

@@ -27,6 +27,8 @@ PRIORS = {
     "centre": "centre-sigma",
     "place": "camera-place-sigma",
     "clock": "camera-clock-sigma",
+    "wheel-scale": "wheel-scale-sigma",
+    "wheel-track": "wheel-track-sigma",
 }
 
 
@@ -103,19 +105,23 @@ def _off(messages: Sequence[Message], estimate: Calibrated) -> tuple[str, ...]:
 
 def _settings_off(messages: Sequence[Message], estimate: Calibrated) -> Iterator[str]:
     for part, value, _ in estimate.parts():
-        setting = PRIORS[part.key.partition("_")[0]]
+        setting = PRIORS[_word(part)]
         si = value / (1.0 if part.unit == "px" else part.scale)
         if abs(si) > OFF_PRIOR * (in_force(messages, setting) or np.inf):
             yield setting
+
+
+def _word(part: CalibrationPart) -> str:
+    """Returns the setting calibrate's word for a part, which may be one of an axis."""
+    words = SETTINGS[IDS["calibrate"]].words
+    return next(word for word in words if part.key.replace("_", "-").startswith(word))
 
 
 def _refused(messages: Sequence[Message], estimate: Calibrated) -> tuple[str, ...]:
     """Returns the parts that the setting calibrate names but that are not estimated at the end."""
     asked = int(in_force(messages, "calibrate") or 0)
     words = SETTINGS[IDS["calibrate"]].words
-    parts = [
-        (part.key.partition("_")[0], estimate.estimated >> k & 1) for k, part in enumerate(PARTS)
-    ]
+    parts = [(_word(part), estimate.estimated >> k & 1) for k, part in enumerate(PARTS)]
     return tuple(
         word
         for bit, word in enumerate(words)

@@ -3,8 +3,7 @@
 
 This is the one place that says so: `check`, `try`, `report` and `explain` show what comes from
 here. The verdict rests on what the recording shows by itself (known.py), on what the filter said of
-itself in this run, and on the recording's truth where it has one. The same run has the same verdict
-in every command.
+itself in this run, and on the recording's truth where it has one.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from enum import IntEnum
 import numpy as np
 
 from pelorus.check.calibration import CalibrationDoubts, calibration
+from pelorus.check.covering import covering, not_covered
 from pelorus.check.estimated import Estimated, estimated
 from pelorus.check.known import Known, known_of
 from pelorus.check.mount import CAMERA_TURN, Turned
@@ -88,8 +88,8 @@ class Remark:
 class Verdict:
     """The verdict on a run.
 
-    `share`: position error as a share of the way, if more than the settings say. `settings`: those
-    that the recording itself asks for. `noises`: remarks on noises that `check` can mend.
+    `share`: position error as a share of the way, beyond what the settings say. `settings`: what
+    the recording itself asks for. `noises`: remarks on noises that `check` can mend.
     """
 
     grade: Grade
@@ -213,14 +213,15 @@ def judged_log(messages: Sequence[Message]) -> tuple[JudgedRun, Known, Verdict]:
 
 def verdict_of(run: JudgedRun | None, known: Known) -> Verdict:
     """Judges a run. It is not examined where a fault of the recording must be mended first."""
-    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.sentence) for f in known.faults]
+    log = [] if run is None else run.messages
+    grades = Grade.CARE, Grade.BAD
+    faults = [Remark(grades[f.grave], f.sentence) for f in not_covered(log, known.faults)]
     agreed = known.judged.agreed
     if known.is_stopped or run is None:
         told = BEHIND if agreed is None else f"{known_words(agreed)}; {CANNOT}"
-        remarks = (*faults, Remark(Grade.CARE, told))
-        return Verdict(Grade.BAD, remarks, is_stopped=True)
+        return Verdict(Grade.BAD, (*faults, Remark(Grade.CARE, told)), is_stopped=True)
     camera = calibration(known.agreed, run.messages)
-    settings = {**camera.settings, **_for_tracks(run, known)}
+    settings = {**camera.settings, **_for_tracks(run, known), **covering(log, known.faults)}
     own = estimated(run.messages, camera)
     found = [*faults, *_of_run(run, known), *of_calibration(camera, own)]
     if agreed is not None:

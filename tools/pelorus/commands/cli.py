@@ -78,7 +78,8 @@ def _run(words: list[str]) -> int:
     from pelorus.errors import PelorusError, gives_up_output  # noqa: PLC0415
 
     is_ours = bool(words) and words[0] in COMMANDS
-    app = application(words[:1] if is_ours else COMMANDS, others=not is_ours)
+    needs_all = not is_ours and words[:1] != ["--version"]
+    app = application(COMMANDS if needs_all else words[:1] * is_ours, others=needs_all)
     status = 0
     try:
         try:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.converters import readings_csv, streams, twist_axes, wheels
 from pelorus.converters.columns import Columns, example
@@ -239,7 +239,7 @@ def _poses_beside(table: Table) -> Poses | None:
             "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
             at=table.row(int(off.argmax())),
         )
-    return Poses(np.asarray(Rotation.from_quat(q).as_matrix()), p)
+    return Poses(np.asarray(scipy.spatial.transform.Rotation.from_quat(q).as_matrix()), p)
 
 
 def _readings(
@@ -302,7 +302,9 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
     off = np.abs(np.linalg.norm(q, axis=1) - 1) > trajectory.QUATERNION_NORM_TOLERANCE
     what = "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)"
     table.remarks += foreign.left_out(path, off, table.row, what)
-    return Trajectory(t_ns[~off], Poses(Rotation.from_quat(q[~off]).as_matrix(), p[~off]))
+    return Trajectory(
+        t_ns[~off], Poses(scipy.spatial.transform.Rotation.from_quat(q[~off]).as_matrix(), p[~off])
+    )
 
 
 def _names_columns(cells: Sequence[str]) -> bool:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.faults.finding import Finding
 from pelorus.io.recording import Recording
@@ -47,7 +47,9 @@ def compare(recording: Recording, truth: TrueMotion) -> Finding:
         _without_bias(readings, truth), before.t_ns, after.t_ns, start, noise.gravity
     )
     tau = (after.t_ns - before.t_ns) * 1e-9
-    turn = Rotation.from_matrix(np.swapaxes(ends.R, 1, 2) @ after.R).as_rotvec()
+    turn = scipy.spatial.transform.Rotation.from_matrix(
+        np.swapaxes(ends.R, 1, 2) @ after.R
+    ).as_rotvec()
     return _judge(
         _sigma(turn / np.sqrt(tau)[:, None]) / noise.gyro_noise,
         _sigma((after.v_B - ends.v_B) / np.sqrt(tau)[:, None]) / noise.accel_noise,

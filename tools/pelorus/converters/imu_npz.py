@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from pelorus.converters import imu_noise, renewal
 from pelorus.errors import PelorusError
@@ -224,7 +224,7 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
             at=f"{key} row {row}",
             expected="1 is expected, in the order x y z w",
         )
-    return np.asarray(Rotation.from_quat(quaternions).as_matrix())
+    return np.asarray(scipy.spatial.transform.Rotation.from_quat(quaternions).as_matrix())
 
 
 # --- the start ------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.converters.streams import Asked, Pictures, Streams, Twists
 from pelorus.errors import PelorusError, resolved
@@ -119,7 +119,7 @@ def _oxts(folder: Path) -> tuple[Floats, Times]:
 def _oxts_twists(where: Path, t_ns: Times, packets: Floats) -> Twists:
     """Returns body velocities: OXTS has them over level ground (forward, left, up)."""
     level = packets[:, VF : VF + 3]
-    tilt = Rotation.from_euler("YX", packets[:, [PITCH, ROLL]])
+    tilt = scipy.spatial.transform.Rotation.from_euler("YX", packets[:, [PITCH, ROLL]])
     return Twists(where, t_ns, tilt.inv().apply(level), packets[:, WX : WX + 3])
 
 
@@ -129,7 +129,9 @@ def _oxts_poses(packets: Floats) -> Poses:
     east = scale * EARTH_M * np.radians(packets[:, LON])
     north = scale * EARTH_M * np.log(np.tan(np.radians(90 + packets[:, LAT]) / 2))
     p = np.stack((east, north, packets[:, ALT]), axis=-1)
-    R = Rotation.from_euler("ZYX", packets[:, [YAW, PITCH, ROLL]]).as_matrix()
+    R = scipy.spatial.transform.Rotation.from_euler(
+        "ZYX", packets[:, [YAW, PITCH, ROLL]]
+    ).as_matrix()
     return Poses(R, p - p[0])
 
 

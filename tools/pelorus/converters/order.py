@@ -12,8 +12,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import fdtri
 
 from pelorus.converters.bag import NS, Bag
 from pelorus.io import arrays, foreign, stamps
@@ -204,4 +204,4 @@ def _are_two_drives(numbers: Floats) -> bool:
     near, far = (float(np.sum((np.diff(x, axis=0) / scale) ** 2)) for x in (numbers, numbers[::2]))
     far += float(np.sum((np.diff(numbers[1::2], axis=0) / scale) ** 2))
     count = len(numbers)
-    return near > float(fdtri(count, count, 1 - CHANCE)) * far
+    return near > float(scipy.special.fdtri(count, count, 1 - CHANCE)) * far

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.converters import streams, twist_axes
 from pelorus.converters.bag import Bag, require_messages
@@ -289,7 +289,9 @@ def _pose(pose: tuple[Any, Any]) -> list[float]:
 
 
 def _poses(numbers: Floats) -> Poses:
-    return Poses(Rotation.from_quat(numbers[:, 3:]).as_matrix(), numbers[:, :3])
+    return Poses(
+        scipy.spatial.transform.Rotation.from_quat(numbers[:, 3:]).as_matrix(), numbers[:, :3]
+    )
 
 
 def _are_rotations(quaternions: Floats) -> bool:

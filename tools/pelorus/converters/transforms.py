@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.converters.bag import Bag
 from pelorus.errors import PelorusError
@@ -84,7 +84,9 @@ class Tree:
         norm = np.linalg.norm(quaternion)
         if child == parent or not np.isfinite(p).all() or not 0.9 < norm < 1.1:
             return
-        link = FrameLink(parent, Poses(Rotation.from_quat(quaternion).as_matrix(), p))
+        link = FrameLink(
+            parent, Poses(scipy.spatial.transform.Rotation.from_quat(quaternion).as_matrix(), p)
+        )
         known = self.links.setdefault(child, link)
         if known.parent == parent and _same(known.T, link.T):
             return

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import fdtri
+import scipy
 
 from pelorus.converters.streams import TwistIn, Twists
 from pelorus.errors import PelorusError
@@ -101,7 +101,7 @@ def _fits_the_world(x: Floats, x_B: Floats, before: Poses, seconds: float) -> bo
     x_W = np.einsum("nij,nj->ni", before.R, x_B)
     in_body, in_world = (float(np.sum((x - own) ** 2)) for own in (x_B, x_W))
     draws = 3 * max(min(int(seconds), len(x)), 1)
-    return in_body > float(fdtri(draws, draws, 1 - CHANCE)) * in_world
+    return in_body > float(scipy.special.fdtri(draws, draws, 1 - CHANCE)) * in_world
 
 
 def _of_poses(twists: Twists, poses: Poses, timing: TwistTiming) -> Twists:

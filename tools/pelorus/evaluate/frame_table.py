@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.errors import PelorusError, write_text
 from pelorus.math.motion import Times
@@ -92,7 +92,7 @@ def _estimate(pose: Pose) -> Floats:
     return np.concatenate(
         (
             pose.p_WB_m,
-            Rotation.from_matrix(pose.R_WB).as_quat(canonical=True),
+            scipy.spatial.transform.Rotation.from_matrix(pose.R_WB).as_quat(canonical=True),
             np.where(pose.knows_covariance & (variances >= 0), variances, np.nan),
             pose.v_B_mps,
             pose.w_B_radps,

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.math import motion, se3
 from pelorus.math.consistency import rms
@@ -126,24 +126,24 @@ def _turned(found: SimilarityFit, a: NamedPoses, b: NamedPoses, fixed: bool) -> 
 
 
 def _readings(R: Floats) -> Iterator[tuple[str, Floats]]:
-    q = Rotation.from_matrix(R).as_quat()
+    q = scipy.spatial.transform.Rotation.from_matrix(R).as_quat()
     for words, by in (
         ("is the quaternion of {} w first?", -1),
         ("is the quaternion of {} w last?", 1),
     ):
-        rolled = Rotation.from_quat(np.roll(q, by, axis=1)).as_matrix()
+        rolled = scipy.spatial.transform.Rotation.from_quat(np.roll(q, by, axis=1)).as_matrix()
         yield words, rolled
     yield "are the rotations of {} world to body? Body to world is expected.", np.swapaxes(R, 1, 2)
 
 
 def _steps(R: Floats) -> Floats:
     """Returns (n, 3) rotation vectors from the first pose to each, in no world's axes."""
-    return np.asarray(Rotation.from_matrix(R[0].T @ R).as_rotvec())
+    return np.asarray(scipy.spatial.transform.Rotation.from_matrix(R[0].T @ R).as_rotvec())
 
 
 def _apart_deg(R_a: Floats, R_b: Floats) -> float:
     between = np.swapaxes(R_a[0].T @ R_a, 1, 2) @ (R_b[0].T @ R_b)
-    return float(np.degrees(rms(Rotation.from_matrix(between).as_rotvec())))
+    return float(np.degrees(rms(scipy.spatial.transform.Rotation.from_matrix(between).as_rotvec())))
 
 
 def _other_frame(a: NamedPoses, b: NamedPoses) -> tuple[float, float, str]:
@@ -152,7 +152,7 @@ def _other_frame(a: NamedPoses, b: NamedPoses) -> tuple[float, float, str]:
     Returns the angle between the axes, the remaining difference, in degrees, and what to ask.
     """
     B = se3.nearest_rotation(_steps(a.poses.R).T @ _steps(b.poses.R))  # maps b's vectors to a's
-    angle_deg = float(np.degrees(Rotation.from_matrix(B).magnitude()))
+    angle_deg = float(np.degrees(scipy.spatial.transform.Rotation.from_matrix(B).magnitude()))
     apart_deg = _apart_deg(a.poses.R, b.poses.R @ B.T)
     return (
         angle_deg,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from pelorus.errors import PelorusError
 from pelorus.io import foreign
@@ -115,9 +115,8 @@ def _fit(points: Floats, road: Floats) -> tuple[float, Floats, Floats]:
 
     Mirrors count, for principal axes have no sign.
     """
-    from scipy.optimize import least_squares  # noqa: PLC0415 - loads slowly
 
-    nearest = cKDTree(road)
+    nearest = scipy.spatial.cKDTree(road)
 
     def distance(x: Floats, mirror: Floats) -> Floats:
         return np.asarray(nearest.query(_moved(points * mirror, x))[0])
@@ -128,7 +127,9 @@ def _fit(points: Floats, road: Floats) -> tuple[float, Floats, Floats]:
     for heading, sign in progress(tries, "fitting to the road"):
         start = np.concatenate(([heading], road.mean(axis=0)))
         mirror = np.array([1.0, sign])
-        found = least_squares(distance, start, args=(mirror,), max_nfev=EVALUATIONS_MAX)
+        found = scipy.optimize.least_squares(
+            distance, start, args=(mirror,), max_nfev=EVALUATIONS_MAX
+        )
         rms = float(np.sqrt(np.mean(found.fun**2)))
         if rms < best[0]:
             best = (rms, mirror, np.asarray(found.x))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.ndimage import median_filter
+import scipy
 
 from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.log import CONTRADICTED, FEW, FilterLog, Flags, period, runs, suspect
@@ -99,7 +99,9 @@ def shocks(log: FilterLog) -> Iterator[Incident]:
         return
     window = max(round(NEIGHBOURHOOD_S * S / max(period(log.reading_ns), 1.0)), STUCK_READINGS)
     window = min(window, len(log.readings)) | 1
-    off = np.abs(log.readings - median_filter(log.readings, (window, 1), mode="nearest"))
+    off = np.abs(
+        log.readings - scipy.ndimage.median_filter(log.readings, (window, 1), mode="nearest")
+    )
     usual = np.quantile(off, 0.95, axis=0)
     times = np.divide(off, usual, out=np.zeros_like(off), where=usual > 0)
     for first, last in _joined(times.max(axis=1) > FAR, log.reading_ns):

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from pelorus.faults.likelihood import with_ratio
 
@@ -19,6 +20,8 @@ class Fault:
     stops: bool = True  # settings tuned in spite of it would be worth nothing
     grave: bool = True  # it spoils the result; otherwise the filter copes
     ratio: float | None = None  # 2 ln of the likelihood ratio with and without it
+    # by which the filter estimates what is off; `calibrate` is added to what is there
+    settings: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def sentence(self) -> str:

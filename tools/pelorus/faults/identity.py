@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import bdtrc
 
 from pelorus.faults.likelihood import of_share
 from pelorus.faults.two_views import TwoViews
@@ -87,7 +87,7 @@ class Jumps:
     def are_slots(self) -> bool:
         goes_on = self.jumps + self.elsewhere
         most = self.elsewhere > ELSEWHERE_SHARE * self.again
-        if most and bdtrc(self.elsewhere - 1, self.again, BY_CHANCE) < CHANCE:
+        if most and scipy.special.bdtrc(self.elsewhere - 1, self.again, BY_CHANCE) < CHANCE:
             return True
         return self.jumps >= JUMPS_LEAST and goes_on > JUMPS_SHARE * (self.jumps + self.ends)
 

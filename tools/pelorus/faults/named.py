@@ -25,6 +25,7 @@ from pelorus.faults.moving import Moving, moving
 from pelorus.faults.resolution import of_resolution
 from pelorus.faults.seen import CameraMotion, pauses
 from pelorus.faults.two_views import TwoViews, two_views
+from pelorus.faults.wheels import of_wheels
 from pelorus.io.recording import Recording
 from pelorus.math.motion import Times
 from pelorus.wire.frames import Imu, Message, Stereo, Twist
@@ -85,6 +86,8 @@ def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
     body_t_ns = next(iter(times_ns.values()))
     times = [_beside_way(fault, short, views, body_t_ns) for fault in times]
     faults = [*found.faults, *_frozen(recording), *times]
+    if found.agreed is not None and not found.faults:  # what is off there would be told twice
+        faults += of_wheels(short, views, CameraMotion.of(short, views))
     faults = sorted(faults, key=lambda fault: not fault.grave)
     return Judged(faults, found.agreed, views)
 

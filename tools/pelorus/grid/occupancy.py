@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import expit, ndtr
 
 from pelorus.errors import PelorusError
 from pelorus.grid import plane
@@ -85,7 +85,7 @@ class Grid:
 
     @property
     def probability(self) -> Floats:
-        return np.asarray(expit(self.log_odds))
+        return np.asarray(scipy.special.expit(self.log_odds))
 
 
 def occupancy(seen: Sightings, wish: Wish) -> Grid:
@@ -245,7 +245,7 @@ def _free(sheet: _Sheet, seen: Sightings, rays: _Rays, range_m: float) -> Floats
         r = np.arange(0.5, reach[part].max() / sheet.step + 0.5) * sheet.step
         behind = length[part] - MARGIN * sigma[part]
         blur = np.maximum(sigma[part], 0.5 * sheet.step)
-        weight = FREE * ndtr((behind[:, None] - r) / blur[:, None])
+        weight = FREE * scipy.special.ndtr((behind[:, None] - r) / blur[:, None])
         height = eye_height[part, None] + climb[part, None] * r
         counts = (height >= rays.band.low_m) & (height <= rays.band.high_m)
         counts &= r <= reach[part, None]

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
 
 from pelorus.errors import PelorusError
 from pelorus.io import arrays, foreign
@@ -62,7 +62,9 @@ def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
         return whole
     first = t_ns[0]
     seconds, own = (lacking - first) * 1e-9, (t_ns - first) * 1e-9
-    R = Slerp(own, Rotation.from_matrix(whole.poses.R))(seconds).as_matrix()
+    R = scipy.spatial.transform.Slerp(
+        own, scipy.spatial.transform.Rotation.from_matrix(whole.poses.R)
+    )(seconds).as_matrix()
     p = np.stack([np.interp(seconds, own, x) for x in whole.poses.p.T], axis=-1)
     together = np.concatenate((t_ns, lacking))
     order = np.argsort(together)
@@ -98,7 +100,10 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
     once, repeats = ascending(path, sound.rows, t_ns)
     turned, turnless = _turned(path, sound.rows, q)
     good = once & turned
-    poses = Poses(Rotation.from_quat(q[good]).as_matrix(), sound.numbers[good, p_at : p_at + 3])
+    poses = Poses(
+        scipy.spatial.transform.Rotation.from_quat(q[good]).as_matrix(),
+        sound.numbers[good, p_at : p_at + 3],
+    )
     return Trajectory(t_ns[good], poses, (*remarks, *repeats, *turnless))
 
 

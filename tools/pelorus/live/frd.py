@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.online.drive import UNKNOWN_COVARIANCE
 from pelorus.online.odometry import Odom
@@ -49,7 +49,7 @@ class Fields(NamedTuple):
 def fields(odom: Odom) -> Fields:
     """Returns the message's fields."""
     R = M @ odom.T_OB.R @ M
-    x, y, z, w = Rotation.from_matrix(R).as_quat(canonical=True)
+    x, y, z, w = scipy.spatial.transform.Rotation.from_matrix(R).as_quat(canonical=True)
     velocity = BOTH @ odom.velocity
     return Fields(
         odom.t_ns // 1000,

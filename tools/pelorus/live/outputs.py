@@ -7,6 +7,8 @@ import json
 import socket
 from typing import Protocol
 
+import scipy
+
 from pelorus.errors import PelorusError
 from pelorus.evaluate.health import reasons
 from pelorus.online.odometry import Odom, turned
@@ -32,13 +34,14 @@ def as_object(odom: Odom) -> dict[str, object]:
     Covariances are 6 x 6 by rows: of x y z rotx roty rotz about the axes of `odom`, as ROS has
     them, and of the velocity in the base's own axes.
     """
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - loads slowly
 
     health = odom.estimate.health
     return {
         "t_ns": odom.t_ns,
         "position_m": _rounded(odom.T_OB.p),
-        "orientation_xyzw": _rounded(Rotation.from_matrix(odom.T_OB.R).as_quat()),
+        "orientation_xyzw": _rounded(
+            scipy.spatial.transform.Rotation.from_matrix(odom.T_OB.R).as_quat()
+        ),
         "covariance": _rounded(turned(odom.T_OB.R, odom.covariance).ravel()),
         "velocity_mps": _rounded(odom.velocity[:3]),
         "rate_radps": _rounded(odom.velocity[3:]),

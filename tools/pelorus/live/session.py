@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.live.camera import Camera, Force, Measured, Picture, Rate
 from pelorus.math import se3
@@ -16,6 +16,7 @@ from pelorus.math.se3 import Poses
 from pelorus.native.binding import Precision
 from pelorus.native.configured import Named
 from pelorus.online import diagnosis
+from pelorus.online.choice import Kind
 from pelorus.online.diagnosis import Level, Status
 from pelorus.online.drive import Setup
 from pelorus.online.eyes import Seen
@@ -33,7 +34,8 @@ def on_camera(mount: Sequence[float], header: Header) -> Poses:
     """Returns T_IB, of points of the base in the body of the filter. `mount` says where the left
     camera sits on the base: m forward, left, up; roll, pitch, yaw in degrees, pitch > 0 down."""
     T_BF = Poses(
-        Rotation.from_euler("ZYX", mount[:2:-1], degrees=True).as_matrix(), np.array(mount[:3])
+        scipy.spatial.transform.Rotation.from_euler("ZYX", mount[:2:-1], degrees=True).as_matrix(),
+        np.array(mount[:3]),
     )
     T_IC = se3.inverse(Poses(np.asarray(header.R_CB), np.asarray(header.t_CB_m)))
     return se3.compose(se3.compose(T_IC, CAMERA_FROM_FLU), se3.inverse(T_BF))
@@ -45,6 +47,7 @@ class How:
 
     mount: tuple[float, ...] = HERE
     within_ms: float = 2.0
+    eyes: Kind = "own"
     settings: Named = field(default_factory=dict)
     precision: Precision = "float32"
     log: Path | None = None
@@ -56,7 +59,7 @@ class Session:
 
     def __init__(self, camera: Camera, how: How) -> None:
         self.camera = camera
-        self.pipeline = Pipeline(round(how.within_ms * 1e6), REMEDY_FOR_G)
+        self.pipeline = Pipeline(round(how.within_ms * 1e6), REMEDY_FOR_G, how.eyes)
         header = header_of(camera.calibrated, camera.inertial)
         self.pipeline.calibrated = replace(camera.calibrated, header=header)
         setup = Setup(header, how.settings, how.precision)

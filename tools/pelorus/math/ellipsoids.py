@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.wire.frames import Landmark, Pose
 from pelorus.wire.layout import Floats, unpack_symmetric
@@ -29,7 +29,9 @@ def ellipsoids(P: Floats) -> Ellipsoids:
     variances, axes = np.linalg.eigh(np.where(good, P, 0.0))
     axes[np.linalg.det(axes) < 0, :, 0] *= -1
     half = SIGMAS * np.sqrt(np.clip(variances, 0, None))
-    return Ellipsoids(half, Rotation.from_matrix(axes).as_quat(canonical=True))
+    return Ellipsoids(
+        half, scipy.spatial.transform.Rotation.from_matrix(axes).as_quat(canonical=True)
+    )
 
 
 def of_pose(pose: Pose) -> Ellipsoids | None:

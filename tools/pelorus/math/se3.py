@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from pelorus.wire.layout import Floats
@@ -42,17 +43,19 @@ def skew(x: ArrayLike) -> Floats:
 
 def exp(rho: ArrayLike, theta: ArrayLike) -> Poses:
     """Returns Exp(rho, theta) = (Exp theta, V rho)."""
-    from scipy.spatial.transform import RigidTransform  # noqa: PLC0415 - loads slowly
 
-    T = RigidTransform.from_exp_coords(np.concatenate((theta, rho), axis=-1))
+    T = scipy.spatial.transform.RigidTransform.from_exp_coords(
+        np.concatenate((theta, rho), axis=-1)
+    )
     return Poses(T.rotation.as_matrix(), T.translation)
 
 
 def log(T: Poses) -> Floats:
     """Returns the twist (..., 6) in the order (rho, theta) with Exp of it = T."""
-    from scipy.spatial.transform import RigidTransform, Rotation  # noqa: PLC0415 - loads slowly
 
-    rigid = RigidTransform.from_components(T.p, Rotation.from_matrix(T.R))
+    rigid = scipy.spatial.transform.RigidTransform.from_components(
+        T.p, scipy.spatial.transform.Rotation.from_matrix(T.R)
+    )
     return np.roll(rigid.as_exp_coords(), 3, axis=-1)  # scipy's order is (theta, rho)
 
 

@@ -114,7 +114,7 @@ def _asked_for(messages: Iterable[Message], library: binding.Library) -> Iterato
 def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float, float, float]:
     """Returns a setting's value as the library takes it: one number, or three for three axes."""
     if isinstance(value, str):
-        return float(_of_words(name, value))
+        return _of_text(name, value)
     if isinstance(value, bool | int | float | np.number):
         return float(value)
     numbers = tuple(float(one) for one in checked(f"config: {name}", np.asarray(value), (3,)))
@@ -123,14 +123,19 @@ def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float
     return numbers[0], numbers[1], numbers[2]
 
 
-def _of_words(name: str, value: str) -> int:
-    """Returns the number of a choice, or the bits of a list."""
+def _of_text(name: str, value: str) -> float:
+    """Returns a number as a settings file has it, the number of a choice, or the bits of a list."""
     setting = schema.SETTINGS[IDS[name]]
+    if not setting.words:
+        try:
+            return float(value)
+        except ValueError:
+            raise PelorusError(f"config: {name} {value!r}: a number") from None
     asked = [] if setting.is_list and value == "off" else value.split(",")
     if set(asked) <= set(setting.words) and (setting.is_list or len(asked) == 1):
         numbers = [setting.words.index(word) for word in asked]
-        return sum(1 << n for n in set(numbers)) if setting.is_list else numbers[0]
-    expected = f"one of {', '.join(setting.words)}" if setting.words else "a number"
+        return float(sum(1 << n for n in set(numbers)) if setting.is_list else numbers[0])
+    expected = f"one of {', '.join(setting.words)}"
     if setting.is_list:
         expected = f"off, or some of {','.join(setting.words)} between commas"
     raise PelorusError(f"config: {name} {value!r}: {expected}")

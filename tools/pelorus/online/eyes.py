@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The front end: a pair of pictures in, points with ids in both pictures out.
 
-`Eyes` is all that the rest knows of it; `open_eyes` is the one line that says which is used.
+`Eyes` is all that the rest knows of it; `open_eyes` says which is used.
 """
 
 from __future__ import annotations
@@ -12,12 +12,19 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus import tracker as own
 from pelorus.errors import PelorusError
+from pelorus.filter import FilterError
+from pelorus.online.choice import Kind
+from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Rectification
 from pelorus.tracking.images import Gray
 from pelorus.tracking.rectified import Evidence
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import ADMITTED_AFTER, Tracker
+from pelorus.wire.layout import Floats
+
+Motion = tuple[Floats, Floats]
 
 
 class Seen(NamedTuple):
@@ -28,31 +35,57 @@ class Seen(NamedTuple):
 
 
 class Eyes(Protocol):
-    """Follows points from pair to pair."""
+    """Follows points from pair to pair.
 
-    def see(self, left: Gray, right: Gray) -> Seen:
-        """Returns the points of the next pair, of pictures as the cameras took them."""
+    `see` raises PelorusError once the pictures show that they are those of no rectified pair:
+    swapped, of another calibration, or not taken together.
+    """
+
+    def see(self, t_ns: int, left: Gray, right: Gray, motion: Motion | None) -> Seen:
+        """Returns the points of the next pair, of pictures as the cameras took them; `motion` is
+        how points are expected to have moved in the rectified camera, x_now = R x_then + p."""
+
+
+class OwnEyes:
+    """The library's tracker (pelorus/vision.h), which rectifies no picture."""
+
+    def __init__(self, calibrated: Calibrated, rectification: Rectification | None) -> None:
+        header, rig = calibrated.header, calibrated.rig
+        camera, size = header.camera, (header.image_width_px, header.image_height_px)
+        self._tracker = (
+            own.Tracker.rectified(camera, *size) if rig is None else own.Tracker(rig, camera=camera)
+        )
+        if size[0] * size[1] > self._tracker.pixels_max:
+            raise PelorusError(f"pictures of {size[0]} x {size[1]} pixels are too large")
+        self._rectification = rectification
+        self._evidence = Evidence(Settings())
+
+    def see(self, t_ns: int, left: Gray, right: Gray, motion: Motion | None) -> Seen:
+        if self._evidence.needs_next:
+            pair = left, right
+            if self._rectification is not None:
+                pair = self._rectification.pictures(left, right)
+            _doubt(self._evidence, *pair)
+        else:
+            self._evidence.skip()
+        seen = self._tracker.track(t_ns, left, right, motion=motion)
+        return Seen(seen.observations["id"].copy(), seen.pixels)
 
 
 class OpenCvEyes:
-    """The tracker of `pelorus track`, one pair at a time: a point is told from its third pair on.
+    """The tracker of `pelorus track`, a point is told from its third pair on."""
 
-    Raises PelorusError once the pictures show that they are those of no rectified pair: swapped,
-    of another calibration, or not taken together.
-    """
-
-    def __init__(
-        self, rectification: Rectification | None, settings: Settings | None = None
-    ) -> None:
+    def __init__(self, rectification: Rectification | None) -> None:
         self._rectification = rectification
-        self._tracker = Tracker(settings or Settings())
+        self._tracker = Tracker(Settings())
         self._evidence = Evidence(self._tracker.settings)
         self._ages: dict[int, int] = {}
 
-    def see(self, left: Gray, right: Gray) -> Seen:
+    def see(self, t_ns: int, left: Gray, right: Gray, motion: Motion | None) -> Seen:
+        del t_ns, motion  # its search begins where a point was
         if self._rectification is not None:
             left, right = self._rectification.pictures(left, right)
-        self._doubt(left, right)
+        _doubt(self._evidence, left, right)
         self._tracker.add(left, right)
         del self._tracker.frames[:-1]
         live = self._tracker.frames[-1]
@@ -62,14 +95,24 @@ class OpenCvEyes:
         pixels = np.hstack((live.left, live.right))[old]
         return Seen((live.id[old] % 2**32).astype(np.uint32), pixels.astype(np.float32))
 
-    def _doubt(self, left: Gray, right: Gray) -> None:
-        self._evidence.add(left, right)
-        if self._evidence.corners:
-            self._evidence.require_rectified((Path("left"), Path("right")))
+
+def _doubt(evidence: Evidence, left: Gray, right: Gray) -> None:
+    """Raises PelorusError where a rectified pair would show something else."""
+    evidence.add(left, right)
+    if evidence.corners:
+        evidence.require_rectified((Path("left"), Path("right")))
 
 
-def open_eyes(rectification: Rectification | None) -> Eyes:
-    """Returns the front end for pictures of this camera; None: they are rectified already."""
+def open_eyes(calibrated: Calibrated, kind: Kind) -> Eyes:
+    """Returns the front end for pictures of this camera. A lens or a size that own eyes cannot take
+    is followed by OpenCV's."""
+    rig = calibrated.rig
+    rectification = None if rig is None else rig.rectification()
+    if kind == "own":
+        try:
+            return OwnEyes(calibrated, rectification)
+        except (PelorusError, FilterError):
+            pass
     return OpenCvEyes(rectification)
 
 

@@ -18,6 +18,9 @@ from pelorus.errors import PelorusError
 from pelorus.evaluate.health import DEGRADED, LOST
 from pelorus.faults.sync import PictureDelay
 from pelorus.math.inertial import Inertial
+from pelorus.math.se3 import Poses
+from pelorus.online.choice import Kind
+from pelorus.online.expected import ExpectedMotion, Velocity, known_velocity
 from pelorus.online.eyes import Eyes, Seen, open_eyes, require_size
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.order import Datum
@@ -25,7 +28,8 @@ from pelorus.online.pairs import Joining, Pairing
 from pelorus.online.together import Together
 from pelorus.rig.read import Calibrated
 from pelorus.tracking.images import Gray
-from pelorus.wire.frames import Header, Imu, Process, Stereo
+from pelorus.wire.frames import Header, Imu, Process, Stereo, Twist
+from pelorus.wire.layout import Floats
 
 WINDOW = 50  # readings by whose median the unit is judged
 WINDOWS_ENOUGH = 4
@@ -75,9 +79,9 @@ class UnitCheck:
 class Pipeline:
     """`blocked` says why nothing is told although data come: what was found cannot be right."""
 
-    def __init__(self, within_ns: int, remedy_for_g: str) -> None:
+    def __init__(self, within_ns: int, remedy_for_g: str, eyes: Kind = "own") -> None:
         """`within_ns`: pictures whose stamps differ by so much at most belong together."""
-        self.within_ns, self._remedy = within_ns, remedy_for_g
+        self.within_ns, self._remedy, self._kind = within_ns, remedy_for_g, eyes
         self.calibrated: Calibrated | None = None
         self.odometry: Odometry | None = None
         self.last: Odom | None = None
@@ -90,6 +94,7 @@ class Pipeline:
         self.joining = Joining()
         self._unit = UnitCheck(self._remedy)
         self._eyes: Eyes | None = None
+        self._expected: ExpectedMotion | None = None
         self.together: Together | None = None
 
     # --- cameras
@@ -99,12 +104,13 @@ class Pipeline:
         assert self.calibrated is not None
         if CAMERAS in self.blocked:
             return []
-        header, rig = self.calibrated.header, self.calibrated.rig
+        header = self.calibrated.header
         require_size(left, right, header.image_width_px, header.image_height_px)
         if self._eyes is None:
-            self._eyes = open_eyes(None if rig is None else rig.rectification())
+            self._eyes = open_eyes(self.calibrated, self._kind)
+        motion = self._motion().until(t_ns + self._offset_ns)
         try:
-            seen = self._eyes.see(left, right)
+            seen = self._eyes.see(t_ns, left, right, motion)
         except PelorusError as error:
             self.blocked[CAMERAS] = str(error)
             return []
@@ -113,8 +119,6 @@ class Pipeline:
     def seen(self, t_ns: int, seen: Seen) -> list[Odom]:
         """Points of the rectified pair."""
         assert self.calibrated is not None
-        rig = self.calibrated.rig
-        offset_ns = 0 if rig is None else round(rig.offset_s * 1e9)
         disparity = seen.pixels[:, 0] - seen.pixels[:, 2]
         if len(disparity) > POINTS_ENOUGH and float(np.median(disparity)) < 0:
             self.blocked[CAMERAS] = (
@@ -125,9 +129,27 @@ class Pipeline:
         if self.together is None:
             self.together = Together(self.calibrated.header.camera)
         self.together.add(t_ns, seen)
-        return self.add(Stereo(t_ns + offset_ns, seen.ids, seen.pixels))
+        return self.add(Stereo(t_ns + self._offset_ns, seen.ids, seen.pixels))
+
+    @property
+    def _offset_ns(self) -> int:
+        """Returns the body's clock less the cameras'."""
+        rig = None if self.calibrated is None else self.calibrated.rig
+        return 0 if rig is None else round(rig.offset_s * 1e9)
 
     # --- motion
+
+    def _motion(self) -> ExpectedMotion:
+        assert self.calibrated is not None
+        if self._expected is None:
+            header = self.calibrated.header
+            self._expected = ExpectedMotion(Poses(header.R_CB, header.t_CB_m))
+        return self._expected
+
+    def _speed(self) -> Floats | None:
+        """Returns the last velocity, where it is known well."""
+        last = None if self.last is None else self.last.estimate
+        return None if last is None else known_velocity(last.velocity, last.velocity_covariance)
 
     def judge(self, reading: Imu) -> None:
         """Whether the accelerometer's unit is right; also before anything is calibrated."""
@@ -144,6 +166,7 @@ class Pipeline:
         for one in readings:
             raw = Inertial(np.array([one.t_ns]), one.a_B_mps2, one.w_B_radps)
             right = self.calibrated.imu.correction.of(raw)
+            self._motion().add(Velocity(one.t_ns, right.w_B_radps[0], self._speed()))
             told += self.add(Imu(one.t_ns, right.a_B_mps2, right.w_B_radps))
         return told
 
@@ -152,6 +175,8 @@ class Pipeline:
     def add(self, datum: Datum) -> list[Odom]:
         """Anything that the filter takes as it is."""
         assert self.odometry is not None
+        if isinstance(datum, Twist):
+            self._motion().add(Velocity(datum.t_ns, datum.w_B_radps, datum.v_B_mps))
         return self._told(self.odometry.add(datum))
 
     def finish(self) -> list[Odom]:

@@ -13,8 +13,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
+import scipy
 
 from pelorus.evaluate.evaluation import Accuracy, assess, by_imu, on_its_clock
 from pelorus.evaluate.frame_table import FrameTable, frame_table
@@ -202,7 +201,7 @@ class Curves:
         about = "Angle of the rotation between estimate and truth, and three sigma of it."
         lines = [("error", turn), ("3 sigma", bound)]
         yield self._chart("Rotation error", "deg", about, lines)
-        low, high = np.array(chi2.interval(BAND, POSE_SIZE)) / POSE_SIZE
+        low, high = np.array(scipy.stats.chi2.interval(BAND, POSE_SIZE)) / POSE_SIZE
         about = (
             "Normalised estimation error squared, per degree of freedom: 1 on average for an "
             "honest filter; 95 % of its frames are in the band."
@@ -243,7 +242,9 @@ class Curves:
         lines = list(zip(TURNS, _turns_deg(frames.stack("qx", "qy", "qz", "qw")).T, strict=True))
         about = "Of the body in the world: about its x, y and z axes, the last one first."
         if self.accuracy is not None:
-            true = _turns_deg(Rotation.from_matrix(self.accuracy.truth.R).as_quat())
+            true = _turns_deg(
+                scipy.spatial.transform.Rotation.from_matrix(self.accuracy.truth.R).as_quat()
+            )
             true = self._spread(self.accuracy.t_ns, true)
             lines += [(f"{name} true", true[:, k]) for k, name in enumerate(TURNS)]
         yield self._chart("Roll, pitch, yaw", "deg", about, lines)
@@ -256,8 +257,8 @@ class Curves:
             np.where(known, values, np.nan)
             for values in (
                 self._frames["nis"] / safe,
-                chi2.ppf((1 - BAND) / 2, safe) / safe,
-                chi2.ppf((1 + BAND) / 2, safe) / safe,
+                scipy.stats.chi2.ppf((1 - BAND) / 2, safe) / safe,
+                scipy.stats.chi2.ppf((1 + BAND) / 2, safe) / safe,
             )
         )
         about = (
@@ -421,7 +422,9 @@ def _turns_deg(quaternion: Floats) -> Floats:
     out = np.full((len(quaternion), 3), np.nan)
     known = np.isfinite(quaternion).all(axis=1)
     if known.any():
-        turned = Rotation.from_quat(quaternion[known]).as_euler("ZYX", degrees=True)
+        turned = scipy.spatial.transform.Rotation.from_quat(quaternion[known]).as_euler(
+            "ZYX", degrees=True
+        )
         out[known] = turned[:, ::-1]
     return out
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.converters.landmark_map import COVARIANCE, POSITION, WORLD
 from pelorus.errors import PelorusError, write_text
@@ -45,7 +45,7 @@ def write_tum(path: Path, messages: Sequence[Message]) -> None:
     if found is None:
         raise PelorusError("there is no pose after a frame to write")
     t_ns, poses = found[0].t_ns, found[0].poses
-    turns = Rotation.from_matrix(poses.R).as_quat(canonical=True)
+    turns = scipy.spatial.transform.Rotation.from_matrix(poses.R).as_quat(canonical=True)
     rows = [
         f"{t // 10**9}.{t % 10**9:09d} {_numbers(p, ' ')} {_numbers(q, ' ')}\n"
         for t, p, q in zip(t_ns.tolist(), poses.p, turns, strict=True)

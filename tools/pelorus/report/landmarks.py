@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from pelorus.evaluate.evaluation import made_in, sigmas_m
 from pelorus.io.trajectory import Trajectory
@@ -84,7 +84,7 @@ class Landmarks:
         way = way[np.isfinite(way).all(axis=1)]
         if not len(way) or not len(p_W_m):
             return np.zeros((len(p_W_m), 3))
-        return np.asarray(way[cKDTree(way).query(p_W_m)[1]])
+        return np.asarray(way[scipy.spatial.cKDTree(way).query(p_W_m)[1]])
 
     def _sightings(self, ids: Any) -> tuple[Any, Any, Any]:
         """Returns first and last frame in which each was seen, ms, and in how many."""

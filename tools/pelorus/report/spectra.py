@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.signal import welch
+import scipy
 
 from pelorus.explain.log import FilterLog
 from pelorus.report.drawings import arrows, plot
@@ -46,7 +46,7 @@ def _spectra(log: FilterLog) -> Iterator[Drawing]:
         ("Vibration: specific force", "m/s²/√Hz", slice(0, 3)),
         ("Vibration: turn rate", "rad/s/√Hz", slice(3, 6)),
     ):
-        f, power = welch(
+        f, power = scipy.signal.welch(
             log.readings[order][:, columns], rate_hz, nperseg=min(SEGMENT, len(t_ns)), axis=0
         )
         lines = [(axis, np.sqrt(power[1:, k])) for k, axis in enumerate("xyz")]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
@@ -83,7 +83,7 @@ def _pose(one: Named) -> Poses:
     q = np.array([one.number(f"q{axis}") for axis in "xyzw"])
     if abs(np.linalg.norm(q) - 1) > 1e-2:
         raise ForeignFileError(one.path, "the quaternion's norm is not 1", at=one.at)
-    return Poses(Rotation.from_quat(q).as_matrix(), p)
+    return Poses(scipy.spatial.transform.Rotation.from_quat(q).as_matrix(), p)
 
 
 def _lens(camera: Named, size: list[int]) -> Lens:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.program.extras import cv2
 from pelorus.rig import spheres
@@ -72,7 +73,11 @@ class Lens:
 
     @property
     def K(self) -> Floats:
-        fx, fy, cx, cy = self.intrinsics
+        return self._matrix(self.intrinsics)
+
+    @staticmethod
+    def _matrix(four: tuple[float, ...]) -> Floats:
+        fx, fy, cx, cy = four
         return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
 
     def distort(self, rays: Floats) -> Floats:
@@ -86,6 +91,23 @@ class Lens:
         zero = np.zeros(3)
         pixels, _ = project(points, zero, zero, self.K, self._D)
         return np.asarray(pixels, np.float64).reshape(-1, 2)
+
+    def maps(
+        self, R: Floats, four: tuple[float, float, float, float], size: tuple[int, int]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Returns for each pixel of a camera without distortion, turned by R, the column and the
+        row in this one's picture. `four`: its fx, fy, cx, cy; `size`: width, height, px."""
+        K = self._matrix(four)
+        if not self._sphere:
+            find = cv2.fisheye if self._is_fisheye else cv2
+            u, v = find.initUndistortRectifyMap(self.K, self._D, R, K, size, cv2.CV_32FC1)
+            return u, v
+        grid = np.stack(np.meshgrid(np.arange(size[0]), np.arange(size[1])), -1).reshape(-1, 2)
+        rays = (grid - four[2:]) / four[:2]
+        x, y, z = (np.column_stack((rays, np.ones(len(rays)))) @ R).T
+        at = self.distort(np.stack((x / z, y / z), axis=-1)).astype(np.float32)
+        u, v = at.T.reshape(2, size[1], size[0])
+        return u, v
 
     def undistort(self, pixels: Floats) -> Floats:
         """Maps pixels (n, 2) to rays (n, 2), x/z and y/z; NaN where the lens has no ray for a

@@ -85,14 +85,9 @@ class Rectification:
 
     @cached_property
     def _maps(self) -> list[tuple[NDArray[np.float32], NDArray[np.float32]]]:
-        u, v = np.meshgrid(np.arange(self.width_px), np.arange(self.height_px))
-        grid = np.stack((u.ravel(), v.ravel()), axis=-1).astype(np.float64)
-        sources = (self._source(side, grid) for side in (self.left, self.right))
-        shape = (self.height_px, self.width_px)
-        return [
-            (at[:, 0].reshape(shape).astype(np.float32), at[:, 1].reshape(shape).astype(np.float32))
-            for at in sources
-        ]
+        camera, size = self.camera, (self.width_px, self.height_px)
+        four = camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
+        return [side.lens.maps(side.R, four, size) for side in (self.left, self.right)]
 
     def _project(self, directions: Floats) -> Floats:
         x, y, z = directions.T

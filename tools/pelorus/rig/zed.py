@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
@@ -80,7 +80,9 @@ def _rig(content: Named, size: str) -> Rig:
     def of(name: str) -> float:
         return number(name) if name in stereo or f"{name}_{size}" in stereo else 0.0
 
-    R = Rotation.from_rotvec([number("rx"), number("cv"), number("rz")]).as_matrix()
+    R = scipy.spatial.transform.Rotation.from_rotvec(
+        [number("rx"), number("cv"), number("rz")]
+    ).as_matrix()
     T = Poses(R, -1e-3 * np.array([number("baseline"), of("ty"), of("tz")]))
     left, right = (_lens(content, side, size) for side in ("left", "right"))
     return Rig.of_cameras(content.path, left, right, T)

@@ -69,9 +69,19 @@ class Evidence:
 
     def add(self, left: Gray, right: Gray) -> None:
         """The next frame."""
-        if self._before is not None and self._frames & (self._frames - 1) == 0:
+        if self._before is not None and _is_power_of_two(self._frames):
             self._look(self._before, left, right)
         self._before = left
+        self._frames += 1
+
+    @property
+    def needs_next(self) -> bool:
+        """Returns whether the next frame is looked at, or is the one before such a frame; others
+        may be left out by `skip`."""
+        return _is_power_of_two(self._frames) or _is_power_of_two(self._frames + 1)
+
+    def skip(self) -> None:
+        """Lets the next frame pass."""
         self._frames += 1
 
     def _look(self, before: Gray, left: Gray, right: Gray) -> None:
@@ -130,6 +140,10 @@ def _most_alike(left: Gray, other: Gray, at: tuple[int, int], reach: int) -> tup
     if best < matching.LIKENESS_MIN or likeness.max() > matching.UNIQUE_RATIO * best:
         return None
     return first + column + HALF - u, top + row + HALF - v
+
+
+def _is_power_of_two(number: int) -> bool:
+    return number > 0 and number & (number - 1) == 0
 
 
 def _more(count: int, others: int) -> bool:

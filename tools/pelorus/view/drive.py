@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pelorus.errors import PelorusError
 from pelorus.evaluate.evaluation import assess, by_imu, on_its_clock
@@ -190,4 +190,4 @@ def _truth(messages: Sequence[Message]) -> dict[int, Floats]:
 
 def quaternion(R: Floats) -> Floats:
     """Returns the quaternion (4,), x y z w."""
-    return np.asarray(Rotation.from_matrix(R).as_quat())
+    return np.asarray(scipy.spatial.transform.Rotation.from_matrix(R).as_quat())

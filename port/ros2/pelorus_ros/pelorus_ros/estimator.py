@@ -19,6 +19,7 @@ from pelorus.converters import ros_frames
 from pelorus.errors import PelorusError, write_text
 from pelorus.io.known_map import known_map
 from pelorus.online import diagnosis
+from pelorus.online.choice import Kind
 from pelorus.online.diagnosis import Status
 from pelorus.online.drive import Setup
 from pelorus.online.eyes import Seen
@@ -59,7 +60,9 @@ class Estimator:
         self.options = options
         self.rigging = Rigging(options)
         within_ns = round(options.sync_matching_threshold_ms * 1e6)
-        self.pipeline = Pipeline(within_ns, f"set the parameter accel_scale to {G_MPS2:g}")
+        eyes: Kind = "opencv" if options.eyes == "opencv" else "own"
+        remedy = f"set the parameter accel_scale to {G_MPS2:g}"
+        self.pipeline = Pipeline(within_ns, remedy, eyes)
         self.waits_for = "for the first data"
         self.counts: Counter[str] = Counter()  # messages used, by topic; what was left out
         self.faults: dict[str, str] = {}  # of messages that could not be read, by topic
@@ -112,7 +115,13 @@ class Estimator:
         self.rigging.heard("imu", message.header.frame_id)
         t_ns = stamp_ns(message.header)
         return self._inertial(
-            [Imu(t_ns, _row(message.linear_acceleration), _row(message.angular_velocity))]
+            [
+                Imu(
+                    t_ns,
+                    _row(message.linear_acceleration),
+                    _row(message.angular_velocity),
+                )
+            ]
         )
 
     def gyro(self, message: Any) -> list[Odom]:
@@ -220,7 +229,10 @@ class Estimator:
             pixels = np.array(sides, np.float64).T.reshape(-1, 4)
         else:
             rows = ros_frames.observations(Path("tracks"), message, self.rigged.calibrated)
-            ids, pixels = (rows[:, 0].astype(np.int64) % 2**32).astype(np.uint32), rows[:, 1:]
+            ids, pixels = (
+                (rows[:, 0].astype(np.int64) % 2**32).astype(np.uint32),
+                rows[:, 1:],
+            )
         rig = self.rigged.calibrated.rig
         if rig is not None:
             pixels = rig.rectification().pixels(pixels)
@@ -234,7 +246,10 @@ class Estimator:
     def _inertial(self, readings: Iterable[Imu]) -> list[Odom]:
         told = []
         for one in readings:
-            a, w = one.a_B_mps2 * self.options.accel_scale, one.w_B_radps * self.options.gyro_scale
+            a, w = (
+                one.a_B_mps2 * self.options.accel_scale,
+                one.w_B_radps * self.options.gyro_scale,
+            )
             scaled = Imu(one.t_ns, a, w)
             self.pipeline.judge(scaled)
             if self._ready():
