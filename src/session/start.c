@@ -6,6 +6,7 @@
 #include "pelorus/assertions.h"
 #include "pelorus/eyes.h"
 #include "session/budget.h"
+#include "session/events.h"
 #include "session/known_map.h"
 #include "session/layers.h"
 #include "session/line.h"
@@ -182,7 +183,8 @@ plr_status plr_start_filter(plr_session *s) {
     plr_config config;
     const plr_status status = init_filter(s, &config, &culprit);
     if (status == PLR_OK && s->options.eyes != NULL)
-        s->options.eyes->calls->begin(s->options.eyes, &s->header, config.camera_offset_s);
+        s->options.eyes->calls->begin(s->options.eyes, &s->header,
+                                      plr_events_camera_offset_s(&config));
     if (status != PLR_OK) {
         plr_phase_change(&s->phase, PLR_TRIGGER_REJECTED);
         tell_contradiction(s, &config);
