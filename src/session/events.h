@@ -31,10 +31,6 @@ void plr_events_take_reading(plr_session *s);
 void plr_events_take_truth(plr_session *s);
 void plr_events_take_start(plr_session *s);
 
-/* From the camera's clock to that of the steps, the setting camera-offset. In mapping there are none:
- * a frame has the time of its TRUTH. */
-double plr_events_camera_offset_s(const plr_config *config);
-
 /* Uses the frames before t_ns. */
 void plr_events_use_frames_before(plr_session *s, plr_time_ns t_ns);
 
