@@ -155,7 +155,7 @@ typedef struct plr_track {
     plr_real right[2];      /* in the right one, when it was last found there */
     plr_real drift[2];      /* from where it was expected to where it was found, px */
     plr_surface surface;    /* when it was last measured */
-    plr_real slope_info[3]; /* inverse of the covariance of its slope, xx xy yy */
+    plr_real slope_info[3]; /* of its slope, from fits: inverse of a covariance, xx xy yy */
     plr_real A[4];          /* from the patch to the left picture as it is now */
     plr_real cov[3];        /* of `at`, xx xy yy, from the last fit */
     plr_real var_right;     /* of uR beside uL */

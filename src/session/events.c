@@ -165,11 +165,9 @@ void plr_events_take_imu(plr_session *s) {
 
 /* --- STEREO, READING --- */
 
-/* The setting camera-offset leads from the camera's clock to that of the steps. (In mapping there
- * are none: a frame has the time of its TRUTH.) False if there is no such time. */
+/* To the clock of the steps. False if there is no such time. */
 static bool move(const plr_session *s, plr_time_ns t_ns, plr_time_ns *moved_ns) {
-    const plr_config *config = plr_filter_config(&s->filter);
-    const double offset_ns = config->mode == PLR_MODE_MAPPING ? 0 : config->camera_offset_s * 1e9;
+    const double offset_ns = plr_camera_offset_s(plr_filter_config(&s->filter)) * 1e9;
     const bool back = offset_ns < 0;
     const plr_time_ns by_ns = (plr_time_ns)((back ? -offset_ns : offset_ns) + 0.5);
     if (back ? t_ns < by_ns : t_ns > UINT64_MAX - by_ns)

@@ -176,13 +176,17 @@ static plr_status init_filter(plr_session *s, plr_config *config, const plr_sett
     return status;
 }
 
+double plr_camera_offset_s(const plr_config *config) {
+    return config->mode == PLR_MODE_MAPPING ? 0 : config->camera_offset_s;
+}
+
 plr_status plr_start_filter(plr_session *s) {
     PLR_ASSERT(s->phase == PLR_PHASE_READY);
     const plr_setting *culprit = NULL;
     plr_config config;
     const plr_status status = init_filter(s, &config, &culprit);
     if (status == PLR_OK && s->options.eyes != NULL)
-        s->options.eyes->calls->begin(s->options.eyes, &s->header, config.camera_offset_s);
+        s->options.eyes->calls->begin(s->options.eyes, &s->header, plr_camera_offset_s(&config));
     if (status != PLR_OK) {
         plr_phase_change(&s->phase, PLR_TRIGGER_REJECTED);
         tell_contradiction(s, &config);

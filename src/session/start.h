@@ -47,4 +47,8 @@ void plr_start_apply_until(plr_session *s, plr_time_ns t_ns);
  * say. If they need a START or TRUTH that has not arrived, the phase stays PLR_PHASE_STARTING. */
 void plr_start_choose(plr_session *s, plr_time_ns t_ns);
 
+/* From the camera's clock to that of the steps, the setting camera-offset. In mapping there are none:
+ * a frame has the time of its TRUTH. */
+double plr_camera_offset_s(const plr_config *config);
+
 #endif

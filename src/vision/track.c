@@ -23,7 +23,7 @@ enum { STEPS_COARSE = 5, STEPS_FINEST = 10, CENTRE_MOVES = 4, HALF = PLR_PATCH_S
 #define TILT PLR_R(2)
 /* What is left over is mostly of interpolation, and the same in each pair: one counts as a share of all. */
 #define SLOPE_SHARE PLR_R(0.03)
-#define SLOPE_KEEP  PLR_R(0.9) /* of what is known of a slope, from pair to pair */
+#define SLOPE_KEEP  PLR_R(0.9) /* of what fits tell of a slope, from pair to pair */
 #define SLOPE_MOST  PLR_R(1)
 enum { SLOPE_FITS = 3 }; /* of a birth */
 
@@ -210,7 +210,39 @@ static bool fit_right(plr_vision *v, const plr_scene *s, const uint8_t (*patch)[
     return true;
 }
 
-/* What the fit at `at` leaves over tells how the surface lies; older fits count less and less. */
+/* What is known of a slope without any fit: the inverse of its variance. A surface of a tilt has the slope
+ * tan(tilt) disparity / f. */
+static plr_real slope_prior(const plr_vision *v, const plr_track *t) {
+    const plr_real px = t->surface.disparity > 1 ? t->surface.disparity : PLR_R(1);
+    const plr_real by = v->fx / (TILT * px);
+    return by * by;
+}
+
+/* slope <- the mean of what a fit measures, of the older fits, which count less and less, and of the prior,
+ * which is not forgotten: a slope that fits do not tell tends to that of a surface that faces the camera. */
+static void weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
+                        const plr_real measured[2], const plr_real fit[3]) {
+    const plr_real was[2] = {PLR_FMA(prior + info[0], slope[0], info[1] * slope[1]),
+                             PLR_FMA(prior + info[2], slope[1], info[1] * slope[0])};
+    const plr_real is[2] = {PLR_FMA(fit[0], measured[0], fit[1] * measured[1]),
+                            PLR_FMA(fit[1], measured[0], fit[2] * measured[1])};
+    for (int i = 0; i < 3; i++)
+        info[i] = plr_leaky_sum(info[i], SLOPE_KEEP, fit[i]);
+    const plr_real a = prior + info[0], b = info[1], c = prior + info[2];
+    const plr_real x = plr_leaky_sum(was[0], SLOPE_KEEP, is[0]);
+    const plr_real y = plr_leaky_sum(was[1], SLOPE_KEEP, is[1]);
+    const plr_real of_all = PLR_FMA(a, c, -(b * b));
+    if (!(of_all > PLR_R(1e-4) * a * c))
+        return;
+    const plr_real by_det = 1 / of_all;
+    const plr_real mean[2] = {PLR_FMA(c, x, -(b * y)) * by_det, PLR_FMA(a, y, -(b * x)) * by_det};
+    for (int i = 0; i < 2; i++)
+        slope[i] = mean[i] > SLOPE_MOST    ? SLOPE_MOST
+                   : mean[i] < -SLOPE_MOST ? -SLOPE_MOST
+                                           : mean[i];
+}
+
+/* What the fit at `at` leaves over tells how the surface lies. */
 static void learn_slope(const plr_vision *v, const plr_scene *s, const uint8_t *patch,
                         const plr_real A[4], plr_track *t, const plr_real at[2]) {
     plr_template template;
@@ -226,22 +258,10 @@ static void learn_slope(const plr_vision *v, const plr_scene *s, const uint8_t *
     c[0] = PLR_FMA(A[3], e[0], -(A[1] * e[1])) / d, c[1] = PLR_FMA(A[0], e[1], -(A[2] * e[0])) / d;
     if (!plr_patch_slope(&s->side[PLR_RIGHT].level[0], &template, at, A, c, change, info))
         return;
-    plr_real *all = t->slope_info;
     for (int i = 0; i < 3; i++)
-        info[i] *= SLOPE_SHARE, all[i] = plr_leaky_sum(all[i], SLOPE_KEEP, info[i]);
-    const plr_real x = PLR_FMA(info[0], change[0], info[1] * change[1]);
-    const plr_real y = PLR_FMA(info[1], change[0], info[2] * change[1]);
-    const plr_real det_all = PLR_FMA(all[0], all[2], -(all[1] * all[1]));
-    if (!(det_all > PLR_R(1e-4) * all[0] * all[2]))
-        return;
-    const plr_real by_det = 1 / det_all;
-    const plr_real slope[2] = {
-        PLR_FMA(PLR_FMA(all[2], x, -(all[1] * y)), by_det, t->surface.slope[0]),
-        PLR_FMA(PLR_FMA(all[0], y, -(all[1] * x)), by_det, t->surface.slope[1])};
-    for (int i = 0; i < 2; i++)
-        t->surface.slope[i] = slope[i] > SLOPE_MOST    ? SLOPE_MOST
-                              : slope[i] < -SLOPE_MOST ? -SLOPE_MOST
-                                                       : slope[i];
+        info[i] *= SLOPE_SHARE;
+    const plr_real measured[2] = {t->surface.slope[0] + change[0], t->surface.slope[1] + change[1]};
+    weigh_slope(t->surface.slope, t->slope_info, slope_prior(v, t), measured, info);
 }
 
 /* Fits the right picture with the patch deformed as the surface lies, and learns how it does. */
@@ -319,9 +339,6 @@ bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool birth
     if (!search_line(v, s, t, kept[level], level, false, &disparity))
         return false;
     t->surface.disparity = disparity;
-    /* a surface of this tilt has the slope tilt times disparity / f */
-    const plr_real by = v->fx / (TILT * (disparity > 1 ? disparity : PLR_R(1)));
-    t->slope_info[0] = t->slope_info[2] = by * by;
     for (int again = 0; again < SLOPE_FITS; again++)
         if (!match_by_slope(v, s, kept, again == 0 ? level : 0, t, at))
             return false;

@@ -86,6 +86,42 @@ def test_every_command_starts_where_there_is_no_termios() -> None:
         assert f"Usage: pelorus {' '.join(command)} " in done.stdout.decode()
 
 
+HEAVY = (
+    *(f"scipy.{part}" for part in ("spatial", "special", "linalg", "sparse", "stats", "optimize")),
+    *(
+        "scipy.signal",
+        "scipy.ndimage",
+        "matplotlib",
+        "pandas",
+        "duckdb",
+        "dask",
+        "distributed",
+        "cv2",
+    ),
+)
+LOADED = """
+import sys
+from pelorus.commands.cli import main
+for words in {commands!r}:
+    assert main(words) == 0, words
+    loaded = [name for name in {heavy!r} if name in sys.modules]
+    assert not loaded, (words, loaded)
+"""
+
+
+def test_what_loads_slowly_is_loaded_by_those_commands_alone_that_use_it(tmp_path: Path) -> None:
+    """By what is loaded, not by the clock. A rotation of scipy takes longer to load than most
+    commands to run.
+    """
+    drive = tmp_path / "drive.plr"
+    clean(duration_s=1.0).write(drive)
+    of_all = [["info", str(drive)], *([*command, "--help"] for command in ((), *SUBCOMMANDS))]
+    for commands, heavy in (([["--version"]], (*HEAVY, "numpy")), (of_all, HEAVY)):
+        program = LOADED.format(commands=commands, heavy=heavy)
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr.decode()
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 def test_a_name_that_the_output_cannot_encode_is_no_reason_to_fail(
     tmp_path: Path, encoding: str

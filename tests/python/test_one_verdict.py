@@ -6,6 +6,7 @@ and what to set. tests/recordings/one_verdict.py asks it of as many drives as on
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ from pelorus.simulate.mishaps import Mishaps
 from pelorus.simulate.settings import Span
 from pelorus.simulate.simulate import Options, simulate
 from pelorus.wire import schema
-from pelorus.wire.frames import Kind, Message, Report, Text, Truth
+from pelorus.wire.frames import End, Kind, Message, Report, Stereo, Text, Truth
+from pelorus.wire.framing import write_file
 from replay_drive import BIN
 from report_runs import built_programs
 
@@ -210,3 +212,37 @@ def test_notes_of_the_search_decide_nothing() -> None:
     ]
     assert verdict.overall(remarks) is Grade.GOOD
     assert remarks[1].mark == "note"
+
+
+def late_by(shift_ns: int, messages: Sequence[Message]) -> list[Message]:
+    return [
+        replace(m, t_ns=m.t_ns + shift_ns) if isinstance(m, Stereo) else m
+        for m in messages
+        if not isinstance(m, End)
+    ]
+
+
+def test_a_late_camera_is_told_with_the_offset_until_that_is_set(
+    tmp_path: Path, pelorus: Command
+) -> None:
+    path = tmp_path / "late.plr"
+    options = Options(duration_s=30.0, speed_mps=1.5, lap_s=12.0, seed=8)
+    late = late_by(55_000_000, list(simulate(options).recording.messages()))
+    write_file(path, sorted(late, key=lambda m: getattr(m, "t_ns", -1)), len(late))
+    before = json.loads(pelorus("explain", path, "--json").out)
+    offset = before["what_to_set"]["camera-offset"]
+    assert float(offset) == pytest.approx(-0.055, abs=0.004)
+    assert any("(camera-offset)" in words for words in before["why"])
+    after = json.loads(pelorus("explain", path, "--json", "--set", f"camera-offset={offset}").out)
+    assert "camera-offset" not in after["what_to_set"]
+    assert not any("(camera-offset)" in words for words in after["why"])
+
+
+def test_noises_are_advised_only_where_none_have_been_chosen(
+    tmp_path: Path, pelorus: Command
+) -> None:
+    path, drive = tmp_path / "quiet.plr", simulate(DRIVE).recording
+    large = replace(drive.header.noise, pixel_sigma_px=5.0, velocity_sigma_mps=0.5)
+    drive.with_header(noise=large).write(path)
+    assert verdict.NOISES in pelorus("explain", path).out
+    assert verdict.NOISES not in pelorus("explain", path, "--set", "pixel-sigma=4").out

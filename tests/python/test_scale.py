@@ -55,7 +55,7 @@ def test_a_baseline_that_is_off_is_told_and_a_bias_of_the_velocity_is_none(
 
 
 def test_what_a_scale_explains_is_no_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    def of_twists(_: Bench, settings: Settings) -> clock.Offset:
+    def of_twists(_: Bench, settings: Settings, _about_s: float | None) -> clock.Offset:
         """A scale that is off moves the best offset, too."""
         wrong = abs(float(settings[SCALE]) - 0.98) > 0.005
         return clock.Offset(-0.03 if wrong else 0.001, 0.002)

@@ -13,12 +13,24 @@ from firmware import pictures
 from pelorus import Tracker
 from pelorus.converters import euroc, with_pictures
 from pelorus.converters.streams import Asked
+from pelorus.io import trajectory
 from pelorus.math.se3 import Poses
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
 from pelorus.tracker import MODELS
 from pelorus.wire import framing
-from pelorus.wire.frames import Config, Header, Message, Pose, Process, Stereo, Twist
+from pelorus.wire.frames import (
+    Config,
+    Header,
+    Imu,
+    Kind,
+    Message,
+    Pose,
+    Process,
+    Report,
+    Stereo,
+    Twist,
+)
 from pelorus.wire.image import Image, RigMessage, TimedPair, pairs_of
 from pelorus.wire.settings import IDS
 from replay_drive import run
@@ -99,9 +111,26 @@ def test_pictures_through_real_lenses_are_kept_and_seen_alike(
     real: Callable[[str], Path], tmp_path: Path
 ) -> None:
     folder = real("images/euroc-v101-start/mav0/cam0/data.csv").parents[2]
-    kept = with_pictures.recording(euroc.read(folder, Asked()))
+    kept, _ = with_pictures.recording(euroc.read(folder, Asked()))
     assert kept.pictures is not None
     assert not len(kept.tracks)
     whole = kept.pictures
     few = replace(whole, t_ns=whole.t_ns[:7], read=lambda: islice(whole.read(), 7))
     assert_the_same(list(standing(list(replace(kept, pictures=few).messages()))), tmp_path)
+
+
+def test_of_a_recording_with_pictures_and_truth_no_message_is_refused(
+    real: Callable[[str], Path], tmp_path: Path
+) -> None:
+    folder = real("images/euroc-mh01-start/truth.tum").parent
+    truth = trajectory.read_truth(folder / "truth.tum")
+    kept, _ = with_pictures.recording(euroc.read(folder, Asked(truth=truth)))
+    assert kept.pictures is not None
+    last = kept.pictures.t_ns[2]
+    few = [m for m in kept.messages() if not getattr(m, "t_ns", 0) > last]
+    assert sum(isinstance(m, Imu) for m in few) > 10
+    framing.write_file(tmp_path / "in.plr", few, len(few))
+    run(tmp_path / "in.plr", "--out", tmp_path / "log.plr")
+    answers = [m for m in framing.messages_of(tmp_path / "log.plr") if isinstance(m, Report)]
+    assert len([m for m in answers if m.subject == Kind.STEREO]) == 3
+    assert not [m for m in answers if m.status != 0]

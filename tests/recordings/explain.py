@@ -144,7 +144,7 @@ def _is_known(found: Incident, known: Sequence[tuple[Cause, int]]) -> bool:
 
 
 def main() -> int:
-    """Prints what was wrong, and the shares."""
+    """Prints each event as it was tried, and the shares."""
     parser = parser_of(__doc__, "recordings whose name contains it")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--first-seed", type=int, default=1)
@@ -162,13 +162,12 @@ def main() -> int:
         own = explained(program, drive.messages, drive.options)
         words = "; ".join([*(e.first.words for e in own.episodes), *own.setup])
         kind = CLEAN if good_share(own) >= GOOD_LEAST else TROUBLED
-        all_tried.append(Tried(kind, drive.name, not own.episodes, words))
-        for event in EVENTS:
-            if given.event in event.name and (one := tried(program, drive, event, own)):
-                all_tried.append(one)
-    for one in all_tried:
-        if not one.right:
-            print(f"{one.event:15} {one.drive:24} {one.words}")
+        asked = (tried(program, drive, e, own) for e in EVENTS if given.event in e.name)
+        clean = Tried(kind, drive.name, not own.episodes, words)
+        for one in filter(None, itertools.chain([clean], asked)):
+            all_tried.append(one)
+            mark = "right" if one.right else "WRONG"
+            print(f"{mark} {one.event:15} {one.drive:24} {one.words}", flush=True)
     for name in (CLEAN, TROUBLED, *(event.name for event in EVENTS)):
         rows = [one.right for one in all_tried if one.event == name]
         if rows:

@@ -38,8 +38,8 @@ from scipy.spatial.transform import Rotation
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "docs/images"))
 
-import hero  # noqa: E402 - its folder is no package
-import street  # noqa: E402
+import hero  # type: ignore[import-not-found]  # noqa: E402 - its folder is no package
+import street  # type: ignore[import-not-found]  # noqa: E402
 
 Gray = NDArray[np.uint8]
 Pair = tuple[Gray, Gray]
@@ -77,7 +77,7 @@ def moving() -> Callable[[int, Pair], Pair]:
         rng, out = np.random.default_rng([5, k]), []
         for side, picture in enumerate(pair):
             u = 130 + 110 * np.sin(2 * np.pi * k / 60) - side * disparity
-            to = np.float32([[1, 0, u], [0, 1, 60 + 10 * np.sin(k / 5)]])
+            to = np.array([[1, 0, u], [0, 1, 60 + 10 * np.sin(k / 5)]], np.float32)
             size = street.WIDTH, street.HEIGHT
             drawn = cv2.warpAffine(texture, to, size) + rng.normal(0, 1, picture.shape)
             covers = cv2.warpAffine(np.ones_like(texture), to, size) > 0.999

@@ -222,6 +222,20 @@ static void test_the_expected_motion_is_that_of_the_steps_since_the_last_pair(vo
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0, T->p[2]);
 }
 
+/* In mapping a frame has the time of its TRUTH, and so has the motion that eyes expect. */
+static void test_in_mapping_eyes_have_no_camera_offset(void) {
+    desk_use_setting("camera-offset", 0.02);
+    begin();
+    drive(1);
+    TEST_ASSERT_EQUAL_DOUBLE(0.02, eyes.camera_offset_s);
+    setUp();
+    desk_use_setting("camera-offset", 0.02);
+    desk_use_setting("mode", PLR_MODE_MAPPING);
+    begin();
+    drive(1);
+    TEST_ASSERT_EQUAL_DOUBLE(0, eyes.camera_offset_s);
+}
+
 /* --- what goes wrong --- */
 
 static void one_good_pair(int k) {

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import scipy
 from pelorus.errors import PelorusError
 from pelorus.io import arrays
 from pelorus.io.arrays import Arrays
@@ -24,7 +25,6 @@ from pelorus.math.axes import body_axes
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
 from pelorus.wire.layout import Floats
-from scipy.spatial.transform import Rotation
 
 from pelorus_course.mat import read_mat
 
@@ -76,7 +76,9 @@ def _read(file: Arrays, twist_timing: TwistTiming) -> Recording:
         name=header_name(file.path.stem),
     )
     v, w = (_first(file, key, count) for key in ("v_vk_vk_i", "w_vk_vk_i"))
-    turns = Rotation.from_rotvec(rotation_vectors.copy())  # it refuses read-only arrays
+    turns = scipy.spatial.transform.Rotation.from_rotvec(
+        rotation_vectors.copy()
+    )  # it refuses read-only arrays
     truth = Poses(turns.as_matrix(), position)
     return Recording(header, t_ns, v, w, t_ns, tracks, t_ns, truth)
 

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.check.contents import AHEAD, recording_of, write
+from pelorus.check.contents import AHEAD, Payloads, recording_of, write
 from pelorus.check.options import Settings, options_of
 from pelorus.evaluate.evaluation import world_laid
 from pelorus.io.tracks import Tracks
@@ -124,14 +124,15 @@ class Parts:
 
     def _write(self, k: int, window: list[Message]) -> None:
         ids, masks = halves(recording_of(window).tracks)
-        self._add(k, "", window)
+        payloads = {id(message): message.pack() for message in window}
+        self._add(k, "", window, payloads)
         for way, first in masks.items():
-            self._add(k, way, of_points(window, ids[first]))
-            self._add(k, way, of_points(window, ids[~first]))
+            self._add(k, way, of_points(window, ids[first]), payloads)
+            self._add(k, way, of_points(window, ids[~first]), payloads)
 
-    def _add(self, k: int, way: str, messages: list[Message]) -> None:
+    def _add(self, k: int, way: str, messages: list[Message], payloads: Payloads) -> None:
         path = self._folder / f"part-{len(self._parts)}.plr"
-        write(path, messages)
+        write(path, messages, payloads)
         self._parts.append(_Part(k, way, path))
 
     def apart(self, settings: Settings) -> HalvesApart:

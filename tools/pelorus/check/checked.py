@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pelorus.check import changes
 from pelorus.check.calibration import calibration
-from pelorus.check.covering import covering
+from pelorus.check.covering import CALIBRATE, covering
 from pelorus.check.estimated import without_clock
 from pelorus.check.halves_alike import with_halves_alike
 from pelorus.check.held import held_against
@@ -107,10 +107,10 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
-    asked = {
-        **calibration(known.agreed, run.messages).settings,
-        **covering(run.messages, known.faults),
-    }
+    estimable = [
+        fault for fault in known.faults if CALIBRATE in fault.settings
+    ]  # the clock is tuned
+    asked = calibration(known.agreed, run.messages).settings | covering(run.messages, estimable)
     if asked:
         tuned = replace(tuned, settings=tuned.settings | asked)
         run = _whole(program, recording, tuned.settings, folder, "after") or run

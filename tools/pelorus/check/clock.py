@@ -49,18 +49,23 @@ class Offset:
 UNTOLD = Offset(0.0, float("inf"))
 
 
-def of_twists(bench: Bench, settings: Settings) -> Offset:
+def of_twists(bench: Bench, settings: Settings, about_s: float | None = None) -> Offset:
     """Estimates the offset by twists in steps of whole readings; unknown with one reading a frame.
 
     A fraction of a reading would make each frame average one reading more, and win by the smaller
-    noise alone.
+    noise alone. Where the offset is known roughly (`about_s`), those farther off are tried only if
+    the best is not near it.
     """
     period_s = seconds(bench.examined.twist_t_ns)
     if seconds(bench.examined.frame_t_ns) < 2 * period_s or not period_s > 0:
         return UNTOLD
     step_s = period_s * max(round(COARSE_S / period_s), 1)
     most = int(OFFSET_MOST_S / step_s + 1e-6)
-    costs = _costs(bench, settings, 0.0, step_s, most)
+    reach = max(int(NEAR_S / step_s + 1e-6), FEWEST - 1) + 1  # a parabola about a neighbour, too
+    middle = None if about_s is None else round(about_s / step_s)
+    costs = {} if middle is None else _costs(bench, settings, middle * step_s, step_s, reach)
+    if middle is None or abs(_best(costs) / step_s - middle) > 1.5:
+        costs = _costs(bench, settings, 0.0, step_s, most)
     offsets = np.array(list(costs))
     best_s = _best(costs)
     beside = np.sort(np.abs(offsets - best_s))[:FEWEST].max(initial=0.0)

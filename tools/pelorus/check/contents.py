@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -170,10 +170,14 @@ def _reading_times(message: Message) -> list[int]:
     return message.times_ns if isinstance(message, Imu) else []
 
 
-def write(path: Path, messages: Sequence[Message]) -> None:
-    """Writes these messages as a recording."""
+Payloads = Mapping[int, bytes]  # of messages that stay, by their id()
+NONE_PACKED: Payloads = {}
+
+
+def write(path: Path, messages: Sequence[Message], payloads: Payloads = NONE_PACKED) -> None:
+    """Writes these messages as a recording; those in `payloads` are packed already."""
     with path.open("wb") as stream:
         writer = Writer(stream)
         for message in messages:
-            writer.write(message)
+            writer.write(message, payloads.get(id(message)))
         writer.end()

@@ -97,6 +97,8 @@ class Bench:
         self.examined = recording_of(messages, asked)
         part = within(first_frames(messages), round(OFFSET_MOST_S * 1e9))
         self._messages = not_before(part, BEGIN_NS)
+        # A hundred recordings are written of them: each message is packed once.
+        self._payloads = {id(message): message.pack() for message in self._messages}
         self._folder = folder
         self._program = program
         self._outlier_cost = outlier_cost(self.header, messages)
@@ -120,7 +122,7 @@ class Bench:
 
     def run_all(self, many: Sequence[Settings], what: str = "replaying") -> list[Outcome]:
         """Returns the outcomes in the order of the settings."""
-        keys = [tuple(sorted(_by_offset(settings).items())) for settings in many]
+        keys = [tuple(sorted(_plain(settings).items())) for settings in many]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         for key in new:
             self._recording(dict(key))
@@ -138,7 +140,8 @@ class Bench:
             messages = half(self._messages, int(key[1])) if key[1] else self._messages
             messages = first_frames(messages, int(key[2])) if key[2] else messages
             messages = scaled(messages, float(key[3]))
-            write(path, shifted(messages, round(float(key[0]) * 1e9)))
+            moved = shifted(messages, round(float(key[0]) * 1e9))
+            write(path, moved, self._payloads)
             self._written[key] = path
         return self._written[key]
 
@@ -154,13 +157,18 @@ class Bench:
         return outcome_of(told, self._outlier_cost)
 
 
-def _by_offset(settings: Settings) -> Settings:
-    """Returns camera-offset as OFFSET: a session moves a frame past at most 64 steps."""
-    if CAMERA_OFFSET not in settings:
-        return settings
-    moved = float(settings[CAMERA_OFFSET]) + float(settings.get(OFFSET, "0"))
-    kept = {k: v for k, v in settings.items() if k != CAMERA_OFFSET}
-    return {**kept, OFFSET: f"{moved:.6f}"}
+def _plain(settings: Settings) -> Settings:
+    """Returns the settings without an OFFSET or SCALE that changes nothing: each is replayed once.
+
+    A camera-offset becomes OFFSET: a session moves a frame past at most 64 steps.
+    """
+    kept = {k: v for k, v in settings.items() if k not in (CAMERA_OFFSET, OFFSET, SCALE)}
+    moved_s = sum(float(settings.get(name, "0")) for name in (CAMERA_OFFSET, OFFSET))
+    if round(moved_s, 6):
+        kept[OFFSET] = f"{moved_s:.6f}"
+    if float(settings.get(SCALE, "1")) != 1:
+        kept[SCALE] = settings[SCALE]
+    return kept
 
 
 def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:

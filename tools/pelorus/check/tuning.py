@@ -75,7 +75,8 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
     fixed, of_bias = biases_by_halves(bench, moved, values)
     off = scale.off_by(bench, moved | written(values, TWIST))
     if one_clock:
-        fixed, found, of_clock = clocked(bench, fixed, values, given, off)
+        about_s = offset.best_s if np.isfinite(offset.sigma_s) else None
+        fixed, found, of_clock = clocked(bench, fixed, values, given, off, about_s)
     else:
         found, of_clock = search_noises(bench, fixed, values, TWIST, FINE), TWO_CLOCKS
     found, of_axes = _axes(bench, fixed, found)
@@ -135,6 +136,7 @@ def clocked(
     values: Mapping[str, float],
     given: Settings,
     off: float = 0.0,
+    about_s: float | None = None,
 ) -> tuple[dict[str, str], BestFound, str]:
     """Returns timing and offset of the camera's clock as settings, the noises again if these
     change, and words.
@@ -142,12 +144,12 @@ def clocked(
     With several readings a frame the offset covers both: another timing is a shift by a whole
     reading. With a single one the timings are tried; `mid` competes only if it is given, for it
     averages two readings and would win by its smaller noise alone. `off` is the known scale error
-    of the velocities, which must not be taken for a clock.
+    of the velocities, which must not be taken for a clock; `about_s` what is roughly known.
     """
     was_s = float(given.get("camera-offset", "0"))
     timing = fixed.get("twist-timing", bench.header.twist_timing.name.lower())
     side = {**fixed, **written(values, TWIST), "twist-timing": timing, SCALE: f"{1 + off:.4f}"}
-    offset = clock.of_twists(bench, side)
+    offset = clock.of_twists(bench, side, about_s)
     settings = {**fixed, "twist-timing": timing, OFFSET: f"{was_s:.6f}"}
     if np.isfinite(offset.sigma_s):
         words = f"twist-timing {timing}: no offset of the camera's clock is likelier than yours "

@@ -15,7 +15,7 @@ from enum import IntEnum
 import numpy as np
 
 from pelorus.check.calibration import CalibrationDoubts, calibration
-from pelorus.check.covering import covering, not_covered
+from pelorus.check.covering import covering, noises_are_usual, not_covered
 from pelorus.check.estimated import Estimated, estimated
 from pelorus.check.known import Known, known_of
 from pelorus.check.mount import CAMERA_TURN, Turned
@@ -226,7 +226,7 @@ def verdict_of(run: JudgedRun | None, known: Known) -> Verdict:
     found = [*faults, *_of_run(run, known), *of_calibration(camera, own)]
     if agreed is not None:
         found.append(Remark(Grade.GOOD, f"{known_words(agreed)}; {CANNOT}"))
-    nis_off = not NIS_LOW <= run.nis <= NIS_HIGH and not settings
+    nis_off = not NIS_LOW <= run.nis <= NIS_HIGH and not settings and noises_are_usual(log)
     return Verdict(overall(found), tuple(found), camera.share, settings, nis_off)
 
 
@@ -402,7 +402,7 @@ def _tracks(run: JudgedRun, known: Known) -> Iterator[Remark]:
         Grade.CARE,
         f"the tracks drift: points are off by {lags[first]:.2f} px after {first} frame and by "
         f"{lags[last]:.2f} px after {last}; track-drift {in_force(run.messages, DRIFT) or 0:.2g} "
-        f"and pixel-sigma {in_force(run.messages, PIXEL) or 0:.2g} px are set for that",
+        f"and pixel-sigma {in_force(run.messages, PIXEL) or 0:.2g} px cover that",
     )
 
 

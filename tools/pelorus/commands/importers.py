@@ -312,8 +312,8 @@ def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | No
     if asked.keep_pictures:
         for remark in whole.all_remarks:
             out.print(escape(remark))
-        made = with_pictures.recording(whole)
-        write(made if timing is None else made.with_header(twist_timing=timing), [], target)
+        made, findings = with_pictures.recording(whole)
+        write(made if timing is None else made.with_header(twist_timing=timing), findings, target)
         return
     converted(whole, timing, asked.fix, target)
 

@@ -175,13 +175,23 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
             tracks = _rectified(tracks, rectification, frames.where)
         moves = _moves(streams.motion, t_ns)
         t_ns, tracks, found = repeated.left_out(moves, t_ns, tracks, header.camera)
+    made, more = of_drive(header, streams, t_ns, tracks, truth)
+    return made, [*found, *more]
+
+
+def of_drive(
+    header: Header, streams: Streams, t_ns: Times, tracks: Tracks, truth: Trajectory | None
+) -> tuple[Recording, list[Finding]]:
+    """Returns a recording of the tracks with motion and truth, and what was found of an IMU.
+
+    `truth` is that of at_frames; an IMU's readings begin with it.
+    """
+    found: list[Finding] = []
     made = with_motion(header, streams, t_ns, tracks)
     if isinstance(streams.motion, Readings):
-        made, more = full_scale.with_ranges(made, streams.motion.inertial)
-        found = [*found, *more]
+        made, found = full_scale.with_ranges(made, streams.motion.inertial)
         made = replace(made, inertial=_from_truth(made.inertial, truth, t_ns))
-    made = made if truth is None else made.with_truth(truth.t_ns, truth.poses)
-    return made, found
+    return (made if truth is None else made.with_truth(truth.t_ns, truth.poses)), found
 
 
 def converted(

@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from pelorus.converters import streams
-from pelorus.converters.streams import Pictures, RawTracks, Streams
+from pelorus.converters.streams import Pictures, Streams
 from pelorus.errors import PelorusError
+from pelorus.faults.finding import Finding
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
@@ -23,8 +24,8 @@ from pelorus.wire.image import PicturesOf, RigMessage, TimedPair
 from pelorus.wire.layout import Floats
 
 
-def recording(found: Streams) -> Recording:
-    """Returns a recording with the source's pictures in the place of tracks."""
+def recording(found: Streams) -> tuple[Recording, list[Finding]]:
+    """Returns a recording with the source's pictures in the place of tracks, and findings."""
     frames, calibrated = found.frames, found.calibrated
     if not isinstance(frames, Pictures):
         raise PelorusError("--keep-pictures: the source has tracks, and no pictures")
@@ -46,16 +47,12 @@ def recording(found: Streams) -> Recording:
                 images.require_alike(where, picture, first)
             yield TimedPair(t, t, left, right)
 
-    none = Tracks.none()
-    of_tracks = replace(found, frames=RawTracks(frames.where[0], t_ns[:0], none))
     truth = None
     if found.truth is not None:
         truth = streams.at_frames(found.truth, t_ns, found.motion)
-    made = streams.with_motion(header, of_tracks, t_ns, none)
-    made = replace(
-        made, frame_t_ns=t_ns[:0], pictures=PicturesOf(t_ns, width, height, pairs, message)
-    )
-    return made if truth is None else made.with_truth(truth.t_ns, truth.poses)
+    made, findings = streams.of_drive(header, found, t_ns, Tracks.none(), truth)
+    shown = PicturesOf(t_ns, width, height, pairs, message)
+    return replace(made, frame_t_ns=t_ns[:0], pictures=shown), findings
 
 
 def _cameras(rig: Rig, header: Header) -> tuple[RigMessage, Header]:

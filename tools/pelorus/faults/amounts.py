@@ -134,41 +134,36 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
             )
         return
     if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
-        yield Fault(
-            "scale",
+        words = (
             f"stereo and odometry disagree in scale: the images show {agreed.scale:.3f} +- "
             f"{sigma:.3f} times the twists' way. Baseline, focal length or the wheels' radius: "
-            "which of them cannot be known",
-            stops=abs(off) > SCALE_WILD,
-            grave=abs(off) > SCALE_WILD,
-            ratio=(off / sigma) ** 2,
+            "which of them cannot be known"
         )
+        yield _scale(words, off, sigma)
         return
     if abs(turn) > max(SCALE_SIGMAS * turn_sigma, SCALE_OFF):
-        yield Fault(
-            "scale",
+        words = (
             f"stereo and odometry disagree in scale: the images show {agreed.turn_scale:.3f} +- "
             f"{turn_sigma:.3f} times the twists' turns. Focal length, a lens that is bent and not "
-            "known to be, or the gyro's scale",
-            stops=abs(turn) > SCALE_WILD,
-            grave=abs(turn) > SCALE_WILD,
-            ratio=(turn / turn_sigma) ** 2,
+            "known to be, or the gyro's scale"
         )
+        yield _scale(words, turn, turn_sigma)
         return
     bias = abs(through) * agreed.speed_mps
     told = bias > BIAS_SIGMAS * bias_sigma and abs(through) > SCALE_OFF
     either = abs(through - off) < 2 * sigma and abs(through) < SCALE_SIGMAS * sigma
     if told and either and abs(through) > SCALE_SIGMAS * its_sigma:
-        wild = abs(through) > SCALE_WILD
-        yield Fault(
-            "scale",
+        words = (
             f"stereo and odometry disagree: the images show {agreed.through_zero:.3f} +- "
             f"{its_sigma:.3f} times the twists' way. The speed varies too little to tell a scale "
-            f"that is off from a bias of {bias:.2g} m/s",
-            stops=wild,
-            grave=wild,
-            ratio=(through / its_sigma) ** 2,
+            f"that is off from a bias of {bias:.2g} m/s"
         )
+        yield _scale(words, through, its_sigma)
+
+
+def _scale(words: str, off: float, sigma: float) -> Fault:
+    wild = abs(off) > SCALE_WILD
+    return Fault("scale", words, stops=wild, grave=wild, ratio=(off / sigma) ** 2)
 
 
 def of_scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
@@ -188,14 +183,7 @@ def of_scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
         ),
     ):
         if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
-            wild = abs(off) > SCALE_WILD
-            yield Fault(
-                "scale",
-                f"stereo and IMU disagree in scale: {words}",
-                stops=wild,
-                grave=wild,
-                ratio=(off / sigma) ** 2,
-            )
+            yield _scale(f"stereo and IMU disagree in scale: {words}", off, sigma)
             return
 
 
@@ -219,7 +207,9 @@ def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
         )
         if not by_imu:
             words += _timing(recording, offset) + _or_turns(agreed)
-        yield Fault("clock", words, stops=False, grave=False, ratio=(offset / sigma) ** 2)
+        settings = {"camera-offset": f"{offset:.3g}"}
+        ratio = (offset / sigma) ** 2
+        yield Fault("clock", words, stops=False, grave=False, ratio=ratio, settings=settings)
     if apart:
         yield Fault(
             "clock-turns",

@@ -20,7 +20,7 @@ class Fault:
     stops: bool = True  # settings tuned in spite of it would be worth nothing
     grave: bool = True  # it spoils the result; otherwise the filter copes
     ratio: float | None = None  # 2 ln of the likelihood ratio with and without it
-    # by which the filter estimates what is off; `calibrate` is added to what is there
+    # that make up for what is off, or estimate it; `calibrate` is added to what is there
     settings: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -85,7 +85,12 @@ class Counts:
 
 def encode(message: Message, sequence: int) -> bytes:
     """Returns one whole frame: COBS(kind, sequence, payload, CRC) and the delimiter."""
-    body = struct.pack("<BH", message.kind, sequence % SEQUENCE_MODULUS) + message.pack()
+    return framed(message.kind, message.pack(), sequence)
+
+
+def framed(kind: Kind, payload: bytes, sequence: int) -> bytes:
+    """Returns the frame of a message whose payload is packed already."""
+    body = struct.pack("<BH", kind, sequence % SEQUENCE_MODULUS) + payload
     return cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + DELIMITER
 
 
@@ -226,9 +231,13 @@ class Writer:
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
         self._counts: Counter[Kind] = Counter()
+        self._written = 0
 
-    def write(self, message: Message) -> None:
-        self._stream.write(encode(message, sum(self._counts.values())))
+    def write(self, message: Message, payload: bytes | None = None) -> None:
+        """Writes a frame; `payload` is the message's, where it is packed already."""
+        packed = message.pack() if payload is None else payload
+        self._stream.write(framed(message.kind, packed, self._written))
+        self._written += 1
         self._counts[message.kind] += 1
 
     def end(self, heard: End | None = None) -> None:

@@ -110,6 +110,8 @@ class Layout:
 
     def pack(self, values: Mapping[str, Any]) -> bytes:
         """Returns the bytes; raises ValueError where a value does not fit its field."""
+        if len(self._runs) == 1 and not self._runs[0].is_text:  # of most messages
+            return self._runs[0].pack(values)
         texts = {
             run.fields[0].name: self._text(run.fields[0], values)
             for run in self._runs
