@@ -24,6 +24,7 @@ from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import ADMITTED_AFTER, Tracker
 from pelorus.wire.layout import Floats
 
+FIRST_LOOK = 4  # a look takes 60 ms, and the first pairs wait while the rest is made ready
 Motion = tuple[Floats, Floats]
 
 
@@ -58,7 +59,7 @@ class OwnEyes:
         if size[0] * size[1] > self._tracker.pixels_max:
             raise PelorusError(f"pictures of {size[0]} x {size[1]} pixels are too large")
         self._rectification = rectification
-        self._evidence = Evidence(Settings())
+        self._evidence = Evidence(Settings(), FIRST_LOOK)
 
     def see(self, t_ns: int, left: Gray, right: Gray, motion: Motion | None) -> Seen:
         if self._evidence.needs_next:

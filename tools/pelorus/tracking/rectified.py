@@ -57,9 +57,11 @@ class Seen:
 
 @dataclass
 class Evidence:
-    """Of some frames, each of twice the number of the one before, for a scene may stand still."""
+    """Of some frames, each of twice the number of the one before, for a scene may stand still; the
+    number of the `first` is a power of two."""
 
     settings: Settings
+    first: int = 1
     corners: int = 0
     seen: Seen = field(default_factory=Seen)
     chance: Seen = field(default_factory=Seen)
@@ -69,7 +71,7 @@ class Evidence:
 
     def add(self, left: Gray, right: Gray) -> None:
         """The next frame."""
-        if self._before is not None and _is_power_of_two(self._frames):
+        if self._before is not None and self._is_looked_at(self._frames):
             self._look(self._before, left, right)
         self._before = left
         self._frames += 1
@@ -78,11 +80,14 @@ class Evidence:
     def needs_next(self) -> bool:
         """Returns whether the next frame is looked at, or is the one before such a frame; others
         may be left out by `skip`."""
-        return _is_power_of_two(self._frames) or _is_power_of_two(self._frames + 1)
+        return self._is_looked_at(self._frames) or self._is_looked_at(self._frames + 1)
 
     def skip(self) -> None:
         """Lets the next frame pass."""
         self._frames += 1
+
+    def _is_looked_at(self, number: int) -> bool:
+        return number >= self.first and number & (number - 1) == 0
 
     def _look(self, before: Gray, left: Gray, right: Gray) -> None:
         mirrored = np.ascontiguousarray(np.flipud(right))
@@ -140,10 +145,6 @@ def _most_alike(left: Gray, other: Gray, at: tuple[int, int], reach: int) -> tup
     if best < matching.LIKENESS_MIN or likeness.max() > matching.UNIQUE_RATIO * best:
         return None
     return first + column + HALF - u, top + row + HALF - v
-
-
-def _is_power_of_two(number: int) -> bool:
-    return number > 0 and number & (number - 1) == 0
 
 
 def _more(count: int, others: int) -> bool:
