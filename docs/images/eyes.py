@@ -30,10 +30,7 @@ def main() -> None:
         (R0, p0), (R1, p1) = bodies[max(k - 1, 0)], bodies[k]
         motion = hero.R_CB @ R1.T @ R0 @ hero.R_CB.T, hero.R_CB @ R1.T @ (p0 - p1)
         seen.append(tracker.track(1 + k * 10**8, hero.gray(left), hero.gray(right), motion=motion))
-    frame = np.repeat(np.arange(FRAMES), [len(one.observations) for one in seen])
-    id = np.concatenate([one.observations["id"] for one in seen]).astype(np.int64)
-    pixels = np.concatenate([one.pixels for one in seen]).astype(np.float64)
-    tracks = Tracks.from_rows(FRAMES, frame, id, pixels)
+    tracks = Tracks.of_frames([s.observations["id"] for s in seen], [s.pixels for s in seen])
     tiles = [hero.with_tracks(pairs[k][0], tracks, k) for k in SHOWN]
     target = sys.argv[1] if len(sys.argv) > 1 else str(Path(__file__).with_suffix(".webp"))
     picture = cv2.cvtColor(np.hstack(tiles), cv2.COLOR_RGB2BGR)

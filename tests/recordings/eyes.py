@@ -86,11 +86,11 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
         tracker.track(int(t), small(left, times), small(right, times), motion=moved)
         for t, (left, right), moved in zip(t_ns, found.frames.read(), motion, strict=True)
     ]
-    frame = np.repeat(np.arange(len(seen)), [len(one.observations) for one in seen])
-    id = np.concatenate([one.observations["id"] for one in seen]).astype(np.int64)
-    pixels = np.concatenate([one.pixels for one in seen]).astype(np.float64)
-    sigma = np.concatenate([one.observations["sigma_px"] for one in seen]).astype(np.float64)
-    tracks = Tracks.from_rows(len(seen), frame, id, pixels, sigma)
+    tracks = Tracks.of_frames(
+        [one.observations["id"] for one in seen],
+        [one.pixels for one in seen],
+        [one.observations["sigma_px"] for one in seen],
+    )
     five = (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.baseline_m)
     header = replace(
         found.calibrated.header, camera=Camera(*five), R_CB=R, t_CB_m=np.asarray(camera.t_CB_m),
@@ -100,7 +100,7 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
     made = streams.with_motion(header, of_tracks, t_ns, tracks)
     assert found.truth is not None
     truth = streams.at_frames(found.truth, t_ns, found.motion)
-    lengths = np.bincount(id)
+    lengths = np.bincount(tracks.id)
     return made.with_truth(truth.t_ns, truth.poses), float(lengths[lengths > 0].mean())
 
 

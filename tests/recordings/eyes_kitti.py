@@ -32,7 +32,6 @@ from pelorus.tracking import images
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
 from pelorus.wire.frames import Camera, Report, TwistTiming
-from pelorus.wire.layout import Floats
 from pelorus_course import matlab
 from scipy.spatial.transform import Rotation
 
@@ -52,24 +51,21 @@ def drives(folder: Path, count: int) -> Iterator[Recording]:
     P = np.loadtxt(folder / "calib.txt").reshape(2, 3, 4)
     fx, fy, cx, cy = P[0, 0, 0], P[0, 1, 1], P[0, 0, 2], P[0, 1, 2]
     header = source.with_header(camera=Camera(fx, fy, cx, cy, -P[1, 0, 3] / fx)).header
-    none = Tracks.from_rows(
-        len(t_ns), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4))
-    )
+    none = Tracks.none(len(t_ns))
     for seed in range(count):
         noise = np.random.default_rng(seed)
         noisy = v + noise.normal(0, V_SIGMA, v.shape), w + noise.normal(0, W_SIGMA, w.shape)
         yield Recording(header, t_ns, *noisy, t_ns, none, t_ns, bodies)
 
 
-def motions(drive: Recording, T_CB: Poses) -> Iterator[tuple[Floats, Floats] | None]:
+def motions(drive: Recording, T_CB: Poses) -> Iterator[Poses | None]:
     """Yields by how much the points move up to each pair: a twist ends at its time."""
     yield None
     steps = np.diff(drive.frame_t_ns) * 1e-9
     for dt, v, w in zip(steps, drive.v_B_mps[1:], drive.w_B_radps[1:], strict=True):
         R = Rotation.from_rotvec(w * dt).as_matrix()
         p = Rotation.from_rotvec(w * dt / 2).as_matrix() @ v * dt
-        E = T_CB.R @ R.T @ T_CB.R.T
-        yield E, T_CB.p - E @ T_CB.p - T_CB.R @ R.T @ p
+        yield se3.conjugate(T_CB, se3.inverse(Poses(R, p)))
 
 
 def followed(drive: Recording, pairs: list[tuple[images.Gray, images.Gray]], points: int) -> Tracks:
@@ -81,11 +77,11 @@ def followed(drive: Recording, pairs: list[tuple[images.Gray, images.Gray]], poi
         tracker.track(int(t), *pair, motion=motion)
         for t, pair, motion in zip(drive.frame_t_ns, pairs, motions(drive, drive.T_CB), strict=True)
     ]
-    frame = np.repeat(np.arange(len(seen)), [len(one.observations) for one in seen])
-    id = np.concatenate([one.observations["id"] for one in seen]).astype(np.int64)
-    pixels = np.concatenate([one.pixels for one in seen]).astype(np.float64)
-    sigma = np.concatenate([one.sights["sigma_px"] for one in seen]).astype(np.float64)
-    return Tracks.from_rows(len(seen), frame, id, pixels, sigma)
+    return Tracks.of_frames(
+        [one.observations["id"] for one in seen],
+        [one.pixels for one in seen],
+        [one.sights["sigma_px"] for one in seen],
+    )
 
 
 def run(program: Path, drive: Recording) -> tuple[judge.Figures, float]:

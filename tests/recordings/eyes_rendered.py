@@ -31,6 +31,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pelorus.io.tracks import Tracks
+from pelorus.math import se3
+from pelorus.math.se3 import Poses
 from pelorus.tracker import Seen, Tracker
 from pelorus.wire.layout import Floats
 from scipy.spatial.transform import Rotation
@@ -87,14 +89,15 @@ def moving() -> Callable[[int, Pair], Pair]:
     return with_board
 
 
-def motions(seed: int) -> Iterator[tuple[Floats, Floats] | None]:
+def motions(seed: int) -> Iterator[Poses | None]:
     """Yields by how much the points of the camera move up to each pair, as odometry tells."""
+    T_CB = Poses(hero.R_CB, np.zeros(3))
     for k, steps in enumerate(hero.twists(seed)):
         R, p, dt = np.eye(3), np.zeros(3), 1 / hero.RATE_HZ / hero.TWISTS_PER_FRAME
         for _, v, w in steps:
             p = p + R @ Rotation.from_rotvec(w * dt / 2).as_matrix() @ v * dt
             R = R @ Rotation.from_rotvec(w * dt).as_matrix()
-        yield (hero.R_CB @ R.T @ hero.R_CB.T, -hero.R_CB @ R.T @ p) if k else None
+        yield se3.conjugate(T_CB, se3.inverse(Poses(R, p))) if k else None
 
 
 def seen_by(pairs: list[Pair], seed: int, points: int, shutter_s: float) -> list[Seen]:
@@ -109,10 +112,7 @@ def seen_by(pairs: list[Pair], seed: int, points: int, shutter_s: float) -> list
 
 def tracks_of(seen: list[Seen]) -> Tracks:
     """Returns all observations."""
-    frame = np.repeat(np.arange(len(seen)), [len(one.observations) for one in seen])
-    id = np.concatenate([one.observations["id"] for one in seen]).astype(np.int64)
-    pixels = np.concatenate([one.pixels for one in seen]).astype(np.float64)
-    return Tracks.from_rows(len(seen), frame, id, pixels)
+    return Tracks.of_frames([one.observations["id"] for one in seen], [one.pixels for one in seen])
 
 
 def surface(R: Floats, p: Floats, u: Floats, v: Floats) -> Floats:

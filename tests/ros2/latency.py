@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Latency of the node from picture to odometry, on real pictures over a real ROS 2.
 
-usage: tools/ros2.sh -s tests/ros2/latency.py [--eyes own|opencv]     (it reports, and bars nothing)
+usage: tools/ros2.sh -s tests/ros2/latency.py [-k own|opencv]     (it reports, and bars nothing)
 
 EuRoC MH_01's first ten seconds of $PELORUS_DATA, pictures at 20 Hz and the IMU at 200 Hz, are
 played at the pace of their stamps by this process to the node in another one. A picture's latency
@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from pelorus.commands.choices import settings_given
 from pelorus.commands.cli import main
 from pelorus.converters import euroc
 from pelorus.converters.streams import Asked, Pictures, Readings
@@ -29,12 +30,6 @@ from sensor_msgs.msg import Image, Imu
 
 FOLDER = Path(os.environ.get("PELORUS_DATA", "../shared/data")) / "images/euroc-mh01-start"
 CONF = Path(__file__).parents[2] / "tools/config/imu-adis16448.conf"
-
-
-def settings() -> list[str]:
-    """Returns the settings of CONF as the node takes them."""
-    lines = (line.partition("#")[0].strip() for line in CONF.read_text().splitlines())
-    return ["=".join(part.strip() for part in line.split("=")) for line in lines if line]
 
 
 def ns(stamp: Time) -> int:
@@ -61,9 +56,10 @@ def test_latency_from_picture_to_odometry(eyes: str, tmp_path: Path) -> None:
         played.append(Played(t, len(played), "imu", imu_message(t, a, w)))
     calibration = [str(one) for one in sorted((FOLDER / "mav0").glob("*/sensor.yaml"))]
     log = tmp_path / "drive.plr"
+    settings = [f"{name}={value}" for name, value in settings_given(CONF, []).items()]
     parameters = {
         "eyes": eyes, "image_qos": "reliable", "calibration": calibration, "base_frame": "",
-        "settings": settings(), "log": str(log),
+        "settings": settings, "log": str(log),
     }  # fmt: skip
     sent_s: dict[int, float] = {}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

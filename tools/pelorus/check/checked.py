@@ -107,9 +107,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
-    estimable = [
-        fault for fault in known.faults if CALIBRATE in fault.settings
-    ]  # the clock is tuned
+    # Others, as a clock that is off, the search above has set already.
+    estimable = [fault for fault in known.faults if CALIBRATE in fault.settings]
     asked = calibration(known.agreed, run.messages).settings | covering(run.messages, estimable)
     if asked:
         tuned = replace(tuned, settings=tuned.settings | asked)

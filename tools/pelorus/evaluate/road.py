@@ -115,7 +115,6 @@ def _fit(points: Floats, road: Floats) -> tuple[float, Floats, Floats]:
 
     Mirrors count, for principal axes have no sign.
     """
-
     nearest = scipy.spatial.cKDTree(road)
 
     def distance(x: Floats, mirror: Floats) -> Floats:

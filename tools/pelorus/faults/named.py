@@ -87,7 +87,7 @@ def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
     times = [_beside_way(fault, short, views, body_t_ns) for fault in times]
     faults = [*found.faults, *_frozen(recording), *times]
     if found.agreed is not None and not found.faults:  # what is off there would be told twice
-        faults += of_wheels(short, views, CameraMotion.of(short, views))
+        faults += of_wheels(short, views)
     faults = sorted(faults, key=lambda fault: not fault.grave)
     return Judged(faults, found.agreed, views)
 

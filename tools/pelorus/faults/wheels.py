@@ -39,13 +39,13 @@ SIGMA_MOST = 0.2  # of the filter's settings
 SCATTER_MOST = 2.0  # factor of a reading's sigma
 
 
-def of_wheels(recording: Recording, views: TwoViews, seen: CameraMotion) -> Iterator[Fault]:
+def of_wheels(recording: Recording, views: TwoViews) -> Iterator[Fault]:
     """Yields faults of the wheels beside an IMU, which must agree with the pictures."""
     wheels = _wheels(recording)
     if not wheels or not len(recording.inertial.t_ns):
         return
     yield from _noisy(wheels)
-    found = _with_doubts(recording, wheels, views, seen)
+    found = _with_doubts(recording, wheels, views)
     if found is None:
         return
     x, sigma = found
@@ -100,7 +100,7 @@ def _noisy(wheels: Sequence[Sequence[Reading]]) -> Iterator[Fault]:
 
 
 def _with_doubts(
-    recording: Recording, wheels: list[list[Reading]], views: TwoViews, seen: CameraMotion
+    recording: Recording, wheels: list[list[Reading]], views: TwoViews
 ) -> tuple[Floats, Floats] | None:
     """Returns the fit and its sigmas; None where too few frames move.
 
@@ -108,7 +108,7 @@ def _with_doubts(
     taken back, and half of it is a sigma (Cook and Stefanski 1994). So is half of what near and far
     points differ by beyond chance.
     """
-    own = _fitted(recording, wheels, seen)
+    own = _fitted(recording, wheels, CameraMotion.of(recording, views))
     if own is None:
         return None
     tracks, camera = recording.tracks, recording.header.camera

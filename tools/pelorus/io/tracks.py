@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +95,21 @@ class Tracks:
         sigma_px: Floats | None = None,
     ) -> Tracks:
         return cls(frame_count, frame, id, pixels, sigma_px).at(np.lexsort((id, frame)))
+
+    @classmethod
+    def of_frames(
+        cls,
+        ids: Sequence[NDArray[np.integer[Any]]],
+        pixels: Sequence[NDArray[np.floating[Any]]],
+        sigmas_px: Sequence[NDArray[np.floating[Any]]] | None = None,
+    ) -> Tracks:
+        """Returns those of one frame or more: of each its ids (n,), pixels (n, 4), and sigmas."""
+        frame = np.repeat(np.arange(len(ids)), [len(one) for one in ids])
+        sigma_px = None if sigmas_px is None else np.concatenate(sigmas_px).astype(np.float64)
+        numbers = np.concatenate(pixels).astype(np.float64)
+        return cls.from_rows(
+            len(ids), frame, np.concatenate(ids).astype(np.int64), numbers, sigma_px
+        )
 
     def at(self, rows: Indices | NDArray[np.bool_]) -> Tracks:
         """Returns these rows, in this order."""

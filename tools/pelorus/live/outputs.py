@@ -34,7 +34,6 @@ def as_object(odom: Odom) -> dict[str, object]:
     Covariances are 6 x 6 by rows: of x y z rotx roty rotz about the axes of `odom`, as ROS has
     them, and of the velocity in the base's own axes.
     """
-
     health = odom.estimate.health
     return {
         "t_ns": odom.t_ns,

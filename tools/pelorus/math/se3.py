@@ -43,7 +43,6 @@ def skew(x: ArrayLike) -> Floats:
 
 def exp(rho: ArrayLike, theta: ArrayLike) -> Poses:
     """Returns Exp(rho, theta) = (Exp theta, V rho)."""
-
     T = scipy.spatial.transform.RigidTransform.from_exp_coords(
         np.concatenate((theta, rho), axis=-1)
     )
@@ -52,7 +51,6 @@ def exp(rho: ArrayLike, theta: ArrayLike) -> Poses:
 
 def log(T: Poses) -> Floats:
     """Returns the twist (..., 6) in the order (rho, theta) with Exp of it = T."""
-
     rigid = scipy.spatial.transform.RigidTransform.from_components(
         T.p, scipy.spatial.transform.Rotation.from_matrix(T.R)
     )
@@ -68,6 +66,11 @@ def inverse(T: Poses) -> Poses:
 def compose(A: Poses, B: Poses) -> Poses:
     """Returns A B."""
     return Poses(A.R @ B.R, apply(A, B.p))
+
+
+def conjugate(T: Poses, A: Poses) -> Poses:
+    """Returns T A T^-1: the motion A as seen in the axes that T leads to."""
+    return compose(T, compose(A, inverse(T)))
 
 
 def apply(T: Poses, s: Floats) -> Floats:

@@ -55,7 +55,7 @@ class ExpectedMotion:
         speeds = [one.v_mps for one in used if one.v_mps is not None]
         v = np.mean(speeds, axis=0) if speeds else np.zeros(3)
         step = se3.exp(v * seconds, np.mean([one.w_radps for one in used], axis=0) * seconds)
-        now = se3.compose(self._T_CB, se3.compose(se3.inverse(step), se3.inverse(self._T_CB)))
+        now = se3.conjugate(self._T_CB, se3.inverse(step))
         return now.R, now.p if speeds else np.zeros(3)
 
 

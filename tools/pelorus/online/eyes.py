@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from pelorus import tracker as own
 from pelorus.errors import PelorusError
-from pelorus.filter import FilterError
 from pelorus.online.choice import Kind
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Rectification
@@ -112,7 +111,7 @@ def open_eyes(calibrated: Calibrated, kind: Kind) -> Eyes:
     if kind == "own":
         try:
             return OwnEyes(calibrated, rectification)
-        except (PelorusError, FilterError):
+        except PelorusError:
             pass
     return OpenCvEyes(rectification)
 

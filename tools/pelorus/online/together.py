@@ -33,10 +33,7 @@ class Together:
 
     def _look(self) -> None:
         all_seen = [seen for _, seen in self._frames]
-        frame = np.repeat(np.arange(len(all_seen)), [len(seen.ids) for seen in all_seen])
-        ids = np.concatenate([seen.ids for seen in all_seen]).astype(np.int64)
-        pixels = np.concatenate([seen.pixels for seen in all_seen]).astype(np.float64)
         t_ns = np.array([t_ns for t_ns, _ in self._frames], np.int64)
-        tracks = Tracks.from_rows(len(all_seen), frame, ids, pixels)
+        tracks = Tracks.of_frames([s.ids for s in all_seen], [s.pixels for s in all_seen])
         found = apart(tracks, t_ns, self._camera)
         self.found = found if found is not None and found.found else None

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,12 @@ class Rig:
         return plain and self.left.intrinsics == self.right.intrinsics and bool(apart < SAME)
 
     def rectification(self) -> Rectification:
+        """Returns the rectification, which is made once; raises ForeignFileError where there is
+        none."""
+        return self._rectification
+
+    @cached_property
+    def _rectification(self) -> Rectification:
         if self.is_rectified:
             baseline_m = float(np.linalg.norm(self.T_RL.p))
             sides = Side(self.left, np.eye(3)), Side(self.right, np.eye(3))

@@ -115,13 +115,7 @@ class Estimator:
         self.rigging.heard("imu", message.header.frame_id)
         t_ns = stamp_ns(message.header)
         return self._inertial(
-            [
-                Imu(
-                    t_ns,
-                    _row(message.linear_acceleration),
-                    _row(message.angular_velocity),
-                )
-            ]
+            [Imu(t_ns, _row(message.linear_acceleration), _row(message.angular_velocity))]
         )
 
     def gyro(self, message: Any) -> list[Odom]:
@@ -229,10 +223,7 @@ class Estimator:
             pixels = np.array(sides, np.float64).T.reshape(-1, 4)
         else:
             rows = ros_frames.observations(Path("tracks"), message, self.rigged.calibrated)
-            ids, pixels = (
-                (rows[:, 0].astype(np.int64) % 2**32).astype(np.uint32),
-                rows[:, 1:],
-            )
+            ids, pixels = (rows[:, 0].astype(np.int64) % 2**32).astype(np.uint32), rows[:, 1:]
         rig = self.rigged.calibrated.rig
         if rig is not None:
             pixels = rig.rectification().pixels(pixels)
@@ -246,10 +237,7 @@ class Estimator:
     def _inertial(self, readings: Iterable[Imu]) -> list[Odom]:
         told = []
         for one in readings:
-            a, w = (
-                one.a_B_mps2 * self.options.accel_scale,
-                one.w_B_radps * self.options.gyro_scale,
-            )
+            a, w = one.a_B_mps2 * self.options.accel_scale, one.w_B_radps * self.options.gyro_scale
             scaled = Imu(one.t_ns, a, w)
             self.pipeline.judge(scaled)
             if self._ready():

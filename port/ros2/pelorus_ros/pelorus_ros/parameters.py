@@ -39,8 +39,7 @@ class Options:
 
     odom_frame: str = parameter("odom", "fixed frame of /odom, the path and the landmarks")
     base_frame: str = parameter(
-        "base_link",
-        "frame whose pose is told; empty: the IMU's (with wheels alone what they move)",
+        "base_link", "frame whose pose is told; empty: the IMU's (with wheels alone what they move)"
     )
     imu_frame: str = parameter("", "frame of the IMU, in place of its messages' frame_id")
     left_camera_frame: str = parameter("", "optical frame of the left camera, in place of frame_id")
@@ -76,21 +75,17 @@ class Options:
         KINDS,
     )
     calibration: list[str] = parameter(
-        [""],
-        "calibration files of any kind that `pelorus convert` reads; empty: camera_info",
+        [""], "calibration files of any kind that `pelorus convert` reads; empty: camera_info"
     )
     rectified: bool = parameter(False, "the pictures are rectified already (image_rect)")
     T_cam_imu: list[float] = parameter(
-        [0.0],
-        "4 x 4 by rows: q_cam = T s_imu of the left camera, in place of /tf_static",
+        [0.0], "4 x 4 by rows: q_cam = T s_imu of the left camera, in place of /tf_static"
     )
     T_base_imu: list[float] = parameter(
-        [0.0],
-        "4 x 4 by rows: q_base = T s_imu, in place of /tf_static; one 0: not given",
+        [0.0], "4 x 4 by rows: q_base = T s_imu, in place of /tf_static; one 0: not given"
     )
     sync_matching_threshold_ms: float = parameter(
-        2.0,
-        "left and right pictures belong together if their stamps differ by so much at most",
+        2.0, "left and right pictures belong together if their stamps differ by so much at most"
     )
     accel_scale: float = parameter(1.0, "to m/s^2: 9.80665 for an IMU that tells g")
     gyro_scale: float = parameter(1.0, "to rad/s: 0.0174533 for an IMU that tells degrees")
@@ -101,19 +96,16 @@ class Options:
         "sensor_data", "of pictures: sensor_data (best effort) or reliable", QOS
     )
     pairs_waiting: int = parameter(
-        3,
-        "pairs of pictures that may wait to be followed; of more the new ones are left out",
+        3, "pairs of pictures that may wait to be followed; of more the new ones are left out"
     )
     settings: list[str] = parameter(
-        [""],
-        "settings of the filter, name=value as pelorus-replay has them: pixel-sigma=1",
+        [""], "settings of the filter, name=value as pelorus-replay has them: pixel-sigma=1"
     )
     precision: str = parameter(
         "float32", "float32, as on the robot's controller, or float64", PRECISIONS
     )
     initial_pose: list[float] = parameter(
-        [0.0],
-        "x y z qx qy qz qw of the base in odom at the start; one 0: the origin, looking at x",
+        [0.0], "x y z qx qy qz qw of the base in odom at the start; one 0: the origin, looking at x"
     )
     initial_pose_sigma: list[float] = parameter([0.01, 0.01], "of initial_pose: m, rad")
     known_map: str = parameter(
@@ -124,8 +116,7 @@ class Options:
     log: str = parameter("", "recording of all that is used, drive.plr(.zst); replays to the bit")
     state_file: str = parameter("", "file of the services save_state and load_state")
     moved_sigma: list[float] = parameter(
-        [0.0, 0.0],
-        "how far it may have moved between save_state and load_state: m, rad",
+        [0.0, 0.0], "how far it may have moved between save_state and load_state: m, rad"
     )
     path_length: int = parameter(1000, "poses kept in the path")
 
