@@ -330,13 +330,17 @@ def clean_pieces(name: str, whole: Recording) -> tuple[int, int]:
     return count, false
 
 
-def injected(name: str, recording: Recording) -> tuple[int, int, int]:
-    """Returns how many faults were named right, of how many, and how many cannot be named."""
+def injected(name: str, recording: Recording, share: float = 1.0) -> tuple[int, int, int]:
+    """Returns how many faults were named right, of how many, and how many cannot be named; of a
+    share of them, drawn by the recording's name."""
     right, asked, beyond = 0, 0, 0
+    chance = np.random.default_rng(list(name.encode()))
     known = Known.of(first_part(recording))
     own = {fault.name for fault in found_in(recording)}
     print(name, "as it is:", *(own or ["clean"]), flush=True)
     for kind, k, wrong, due in injections(recording):
+        if chance.random() >= share:
+            continue
         said = faults_in(wrong)
         named = [fault.name for fault in said if fault.name not in own - set(due)]
         good = bool(named) and named[0] in due

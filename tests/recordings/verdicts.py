@@ -2,12 +2,13 @@
 """Is `pelorus check` right in both directions? Clean drives, of which it must accuse none, and
 drives with a fault put in, which it must name: one program, one set of thresholds, one run.
 
-usage: verdicts.py [--drives N] [--seed S] [--only TEXT] [--injected] [--verdicts] [--bin build/bin]
+usage: verdicts.py [--drives N] [--seed S] [--only TEXT] [--injected [--share 0.1]] [--verdicts]
+                   [--bin build/bin]
 
 found      clean simulated drives of every kind of robot (tests/python/robots.py) through a
            converter's search for faults and that of `check`: how many are FOUND faulty
 --injected and the faults of tests/python/injected.py in real recordings and simulated drives: how
-           many are named rightly
+           many are named rightly; --share tries a part of them, drawn at random
 --verdicts and `check` as a whole on clean drives, simulated (N of them) and real: how many that are
            right (ATE at most 0.5 % of the way) it says not to trust
 
@@ -113,7 +114,7 @@ def clean(count: int, seed: int, only: str) -> list[tuple[str, int, int]]:
 # --- faults put in --------------------------------------------------------------------------------
 
 
-def with_faults(only: str, folder: Path) -> list[tuple[str, int, int, int]]:
+def with_faults(only: str, folder: Path, share: float) -> list[tuple[str, int, int, int]]:
     """Returns recording, injected faults, those named right, and those beyond the data."""
     rows = []
     drives: list[tuple[str, Recording]] = []
@@ -126,7 +127,7 @@ def with_faults(only: str, folder: Path) -> list[tuple[str, int, int, int]]:
         if only in f"{seed} ({settings.kind})":
             drives.append((f"{seed} ({settings.kind})", everyday.drive(settings, seed)))
     for name, recording in drives:
-        right, asked, beyond = injected.injected(Path(name).stem, recording)
+        right, asked, beyond = injected.injected(Path(name).stem, recording, share)
         rows.append((Path(name).stem, asked, right, beyond))
         print(f"{name}: {right} of {asked}", flush=True)
     return rows
@@ -200,6 +201,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="")
     parser.add_argument("--injected", action="store_true")
+    parser.add_argument("--share", type=float, default=1.0)
     parser.add_argument("--verdicts", action="store_true")
     parser.add_argument("--bin", type=Path, default=ROOT / "build/bin")
     asked = parser.parse_args()
@@ -208,7 +210,7 @@ def main() -> None:
             rows = clean(asked.drives, asked.seed, asked.only)
             table(("clean drives", "drives", "found faulty"), rows)
         if asked.injected:
-            named = with_faults(asked.only, Path(folder))
+            named = with_faults(asked.only, Path(folder), asked.share)
             table(("faults put in", "faults", "named", "less than can be told"), named)
         if asked.verdicts:
             program = asked.bin / "pelorus-replay"

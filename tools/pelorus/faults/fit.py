@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.faults.drift import Drift
 from pelorus.faults.seen import CameraMotion
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Indices
@@ -42,6 +43,7 @@ class Design:
 
     `y` is (k, 6), v and w. `Z` are the instruments: X without what shares the noise of y, and
     further ones behind. `g` is the camera's velocity by the body's motion, `at` is ascending time.
+    `drift` is what noise of an IMU adds to y.
     """
 
     y: Floats
@@ -51,6 +53,7 @@ class Design:
     prior: Floats  # (m, m), inverse variances
     g: Floats
     at: Indices
+    drift: Drift | None = None
 
 
 def joined(*parts: Design) -> Design:
@@ -113,7 +116,7 @@ class Fit:
         self.blocks = int(np.clip(self.frames // BLOCK_FRAMES, BLOCKS_LEAST, blocks_most))
         self.x = np.asarray(x)
         self.cost = float(np.sum(np.log(spread)))
-        self._known = inverse @ prior @ inverse.T
+        self._known = inverse @ (prior + self._drifted(design)) @ inverse.T
         self.covariance = self.covariance_of(left) + self._known
         self.sigma = np.sqrt(np.diagonal(self.covariance))
         shared = variance / (variance + extra)  # share of the variance that the images add
@@ -121,6 +124,13 @@ class Fit:
         middle = (of_all * (trust * shared).reshape(-1, 1)).T @ of_all
         images = inverse @ middle @ inverse.T
         self.image_sigma = np.sqrt(np.maximum(np.diagonal(images), 0.0))
+
+    def _drifted(self, design: Design) -> Floats | float:
+        """Returns the covariance of the score by an IMU's own noise."""
+        if design.drift is None:
+            return 0.0
+        score = (self._Z * self._trust[..., None])[:, :3]
+        return design.drift.covariance_of(score, design.at)
 
     def covariance_of(self, left: Floats) -> Floats:
         """Returns the covariance of the unknowns from the residuals `left` (k, a).

@@ -12,9 +12,12 @@ A wrong baseline is s; a wrong focal length changes turns and displacements of t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.faults.drift import Densities, Drift
 from pelorus.faults.fit import (
     BIAS,
     CLOCK,
@@ -83,7 +86,10 @@ class ImuBody:
         """Returns the design of the usable pairs, as fit.Body."""
         told = self.force(recording.frame_t_ns, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
-        return joined(*(_design(told, arm, own, others, bias) for own, others in seen.pairs()))
+        of = Densities.of(recording.header.noise, self.readings)
+        drift = Drift(told, np.diff(recording.frame_t_ns) * 1e-9, of)
+        every = [_design(told, arm, own, others, bias) for own, others in seen.pairs()]
+        return replace(joined(*every), drift=drift)
 
 
 def _design(
