@@ -71,7 +71,7 @@ def explained(messages: list[Message], folder: Path, *options: str) -> Explanati
 def test_of_a_clean_drive_it_is_said_that_nothing_happened(tmp_path: Path, by_imu: bool) -> None:
     found = explained(simulated(by_imu), tmp_path)
     assert found.first is None
-    assert found.lines()[0].startswith("nothing happened in ")
+    assert found.lines()[0].startswith("no event in ")
     assert len(found.lines()) == 1
 
 

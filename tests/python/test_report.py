@@ -342,7 +342,8 @@ def test_it_is_said_whether_a_gate_is_inert_or_locked(tmp_path: Path, programs: 
     found = compared(recorded(tmp_path, drive()), programs)
     reasons = found.main.frames["reasons"]
     reasons[:] = words.GATE_INERT
-    assert "yours: gate inert in 40 frames" in lines_with(found)
+    assert "yours: gate inert" not in lines_with(found)  # the verdict judges the gate of the user
+    assert "course: gate inert in 6 frames" in lines_with(found)
     reasons[:] = words.GATE_LOCKED
     assert "yours: gate locked in 40 frames" in lines_with(found)
 

@@ -117,10 +117,10 @@ class Explanation:
 
     def _head(self) -> Iterator[str]:
         count = len(self.episodes)
-        what = "nothing happened" if not count else "one event" if count == 1 else f"{count} events"
+        what = "no event" if not count else "one event" if count == 1 else f"{count} events"
         whole, along = self.seconds(self.end_ns), ""
         if not count and self.setup:
-            what, along = "no event", ", but something is wrong all along"
+            along = ", but something is wrong all along"
         if count == 1:
             what += f" ({self.episodes[0].first.cause})"
         elif self.diverged:

@@ -69,7 +69,7 @@ def plot(
         )
         out.append(f'<polyline class="s{k % 4}" points="{points}"/>')
         out.append(
-            f'<text class="k{k % 4}" x="{WIDTH - RIGHT - 4}" y="{TOP + 14 * (k + 1)}" '
+            f'<text class="k{k % 4}" x="{WIDTH - RIGHT - 4}" y="{TOP + 16 * (k + 1)}" '
             f'text-anchor="end">{escape(name)}</text>'
         )
     return _svg(WIDTH, HEIGHT, "".join(out))

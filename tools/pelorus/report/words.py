@@ -164,16 +164,16 @@ def _map(run: Run) -> Iterator[str]:
 
 def _gate(run: Run) -> Iterator[str]:
     reasons = run.frames.reasons
-    inert = int(np.count_nonzero(reasons & GATE_INERT))
     locked = int(np.count_nonzero(reasons & GATE_LOCKED))
-    if inert > INERT_MANY * len(reasons):
-        yield f"gate inert in {inert} frames: it rejected none of the last 1000 matches. Too wide?"
     if locked:
         yield f"gate locked in {locked} frames: most matches were rejected, the landmarks dropped."
 
 
 def _noise(run: Run) -> Iterator[str]:
     reasons = run.frames.reasons
+    inert = int(np.count_nonzero(reasons & GATE_INERT))
+    if inert > INERT_MANY * len(reasons):
+        yield f"gate inert in {inert} frames: it rejected none of the last 1000 matches. Too wide?"
     gated, matched = run.summary["gated"], run.summary["matched"]
     if matched and gated > GATED_MANY * matched:
         yield (

@@ -163,12 +163,14 @@
     const title = made.firstChild.textContent, note = node("span", "soft");
     made.firstChild.append(note);
     const columns = chart.lines.map(unpack);
+    const measured = (k) => chart.lines.findIndex(({ name }) => chart.lines[k].name === `${name} true`);
+    const hue = (k) => measured(k) < 0 ? k : measured(k); // the truth has the colour of what is measured, dashed
     const series = chart.lines.map((line, k) => {
       const inBand = (chart.band || []).includes(k);
       return {
         label: line.name, width: inBand ? 1 : 1.5, spanGaps: false, points: { show: count < 60 },
-        stroke: () => css(inBand ? "--l3" : `--l${(line.like ?? k) % 4}`), // that of another log as its like
-        dash: line.like != null ? [6, 3] : k > 3 ? [5, 4] : undefined, value: (u, x) => short(x),
+        stroke: () => css(inBand ? "--l3" : `--l${hue(line.like ?? k) % 4}`), // that of another log as its like
+        dash: line.like != null ? [6, 3] : measured(k) >= 0 || k > 3 ? [5, 4] : undefined, value: (u, x) => short(x),
       };
     });
     const u = new uPlot({
