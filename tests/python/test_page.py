@@ -326,6 +326,19 @@ def test_the_map_turns_by_keys_and_outlines_are_the_projected_covariances(
     assert browser.does("window.pelorus.map.pitch") == 90
 
 
+def test_a_true_angle_is_dashed_in_the_colour_of_the_estimate(browser: Tab, written: Path) -> None:
+    browser.open(written, 1280)
+    browser.does("window.pelorus.drawAll()")
+    browser.settle()
+    rows = "[...document.querySelectorAll('.u-series')].map((r) => "
+    rows += "[r.querySelector('.u-label').textContent.split(':')[0], "
+    rows += "r.querySelector('.u-marker').style.borderColor])"
+    colours = dict(browser.does(rows))
+    for name in ("roll", "pitch", "yaw"):
+        assert colours[f"{name} true"] == colours[name], colours
+    assert len({colours[name] for name in ("roll", "pitch", "yaw")}) == 3
+
+
 def test_another_log_stands_beside_curve_by_curve(
     browser: Tab, tmp_path: Path, log: list[Message]
 ) -> None:

@@ -50,6 +50,24 @@ def test_a_signal_leaves_no_part_and_the_older_result(tmp_path: Path, number: in
     assert (tmp_path / "t.tum").read_text() == "an older one\n"
 
 
+def test_what_a_killed_replay_left_is_replaced_by_the_next(tmp_path: Path) -> None:
+    """Nothing can be done at SIGKILL: the name tells that it is a part, and the next run ends it."""
+    (tmp_path / "t.tum").write_text("an older one\n")
+    killed = begun(tmp_path)
+    killed.kill()
+    assert killed.wait(WAIT_S) == -signal.SIGKILL
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == ["log.plr.part", "t.tum", "t.tum.part"]
+    assert (tmp_path / "t.tum").read_text() == "an older one\n"
+    source = tmp_path / "drive.plr"
+    source.write_bytes(encode(drive()))
+    outputs = ("--quiet", "--out", str(tmp_path / "log.plr"))
+    again = [str(BIN / "pelorus-replay"), str(source), *outputs]
+    assert subprocess.run(again, check=False, timeout=WAIT_S).returncode == 0
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == ["drive.plr", "log.plr", "t.tum", "t.tum.part"]
+
+
 def test_what_is_ignored_stays_ignored(tmp_path: Path) -> None:
     """As under nohup: the replay goes on to its end."""
     replay = begun(tmp_path, "sh", "-c", 'trap "" HUP; exec "$@"', "sh")

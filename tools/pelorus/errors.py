@@ -58,11 +58,8 @@ def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
         with _collected() as part:
             yield (part,)
         return
-    files = tuple(_file_of(path) for path in paths)
+    files = places(*paths)
     parts = tuple(_part(file) for file in files)
-    for path, file in zip(paths, files, strict=True):
-        if not file.parent.exists():
-            raise PelorusError(f"{path}: cannot be written: there is no folder {file.parent}")
     try:
         yield parts
         for path, file, part in zip(paths, files, parts, strict=True):
@@ -74,6 +71,19 @@ def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
             if part != file:
                 with suppress(OSError):
                     part.unlink(missing_ok=True)
+
+
+def places(*paths: Path) -> tuple[Path, ...]:
+    """Returns the files behind the paths; raises PelorusError where one can be none. Commands that
+    compute for minutes ask before.
+    """
+    files = tuple(_file_of(path) for path in paths)
+    for path, file in zip(paths, files, strict=True):
+        if not file.parent.exists():
+            raise PelorusError(f"{path}: cannot be written: there is no folder {file.parent}")
+        if file.is_dir():
+            raise PelorusError(f"{path}: cannot be written: is a folder")
+    return files
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from typing import Any, get_type_hints
 import typer
 from typer.models import ParameterInfo
 
-from pelorus.errors import STANDARD_OUTPUT, Existing
+from pelorus.errors import STANDARD_OUTPUT, Existing, places
 from pelorus.program.console import leave_standard_output
 
 FOLDER = "DIR"  # the metavar of an output folder
@@ -53,6 +53,7 @@ def _guarded(function: Callable[..., Any]) -> Callable[..., Any]:
                 leave_standard_output()
             elif given[name] is not None:
                 Existing.keep(Path(given[name]))
+                places(Path(given[name]))  # before the minutes that it takes, not after
         return function(**given)
 
     hints = get_type_hints(function)
