@@ -51,7 +51,7 @@ def test_a_signal_leaves_no_part_and_the_older_result(tmp_path: Path, number: in
 
 
 def test_what_a_killed_replay_left_is_replaced_by_the_next(tmp_path: Path) -> None:
-    """Nothing can be done at SIGKILL: the name tells that it is a part, and the next run ends it."""
+    """Nothing can be done at SIGKILL: the name tells what it is, and the next run ends it."""
     (tmp_path / "t.tum").write_text("an older one\n")
     killed = begun(tmp_path)
     killed.kill()

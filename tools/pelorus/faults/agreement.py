@@ -142,8 +142,8 @@ def _tilt(fit: Fit) -> tuple[Floats, Floats]:
 def _sigma(fit: Fit, by_imu: bool) -> float:
     """Returns the standard error of the scale.
 
-    With an IMU the blocks are shorter than the stretches that share unknowns, and give too small an
-    error; but the readings' own noise is small, and what the images add is known.
+    With an IMU the blocks are shorter than the stretches that share unknowns, and show too little
+    of what lasts: of the readings' noise, which the fit adds itself (drift.py), and of the images'.
     """
     return max(fit.known(SCALE), fit.image_sigma[SCALE]) if by_imu else fit.known(SCALE)
 

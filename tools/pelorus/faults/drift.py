@@ -2,10 +2,11 @@
 """What an IMU's own noise adds to the errors of a fit.
 
 Noise of the gyro turns the attitude for the rest of a stretch, and gravity with it; noise of the
-accelerometer stays in the velocity; a bias that wanders stays for the rest of the drive. Such errors
-last as long as a stretch, so that residuals, which have the stretch's start fitted to them, hardly
-show them. Where a drive is slow they exceed what the images add. They are propagated instead, from
-the densities that the HEADER tells: a kick in each interval, and what it does to all later ones.
+accelerometer stays in the velocity; a bias that wanders stays for the rest of the drive. Such
+errors last as long as a stretch, so that residuals, which have the stretch's start fitted to them,
+hardly show them. Where a drive is slow they exceed what the images add. They are propagated
+instead, from the densities that the HEADER tells: a kick in each interval, and what it does to all
+later ones.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.faults.force import Force
 from pelorus.io.tracks import Indices
@@ -69,7 +71,7 @@ class Drift:
         errors of the velocity in body axes (r, 3); `at` are the rows' intervals.
         """
         own = self.force
-        known = np.isfinite(own.turn).all(axis=1)
+        known: NDArray[np.bool_] = np.asarray(np.isfinite(own.turn).all(axis=1))
         to_body = np.where(known[:, None, None], own.of_start[:, :, :3], np.eye(3))
         P = np.zeros((len(to_body), 3, score.shape[2]))
         np.add.at(P, at, score)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,9 @@ def joined(*parts: Design) -> Design:
     """Returns the rows of all designs in the order of time."""
     order = np.argsort(np.concatenate([part.at for part in parts]), kind="stable")
     names = ("y", "X", "Z", "variance", "g", "at")
-    rows = {n: np.concatenate([getattr(part, n) for part in parts])[order] for n in names}
+    rows: dict[str, Any] = {
+        n: np.concatenate([getattr(part, n) for part in parts])[order] for n in names
+    }
     return replace(parts[0], **rows | {"Z": _within(rows["Z"], rows["X"])})
 
 

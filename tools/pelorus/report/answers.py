@@ -30,7 +30,7 @@ MEANING = (
     "where the recording knows them to be, with its NEES an axis. Poses that were given, in mode "
     "mapping, have no error. The last column: time of the recording over time of the computing. "
     "Yours is the filter with the settings that were given, in float32 like dead reckoning, which "
-    "is the twists alone."
+    "is the twists, or the IMU, alone."
 )
 ALSO = (
     " World is the textbook's EKF with landmarks in world coordinates; course is the same with the "
@@ -137,10 +137,12 @@ def of_comparison(
 def _facts(compared: Comparison) -> str:
     summary = compared.main.summary
     header = compared.subject.header
+    readings = summary["imu_readings"]
+    moved = f"{readings} IMU readings" if readings else f"{summary['twists']} twists"
     return (
         f"{compared.subject.path.name}: {summary['duration_s']:.1f} s, "
         f"{summary['frames'] + summary['frames_refused']} stereo frames with "
-        f"{summary['observations']} observations, {summary['twists']} twists; "
+        f"{summary['observations']} observations, {moved}; "
         f"path {summary['path_m']:.1f} m; body axes "
         f"{header.body_axes.name.lower().replace('_', '-')}."
     )
