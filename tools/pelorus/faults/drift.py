@@ -42,7 +42,7 @@ class Densities:
         there is: white noise is at most what readings differ by from one to the next.
         """
         told = [
-            value if (value := getattr(noise, name)) > 0 else DEFAULTS[name.replace("_", "-")]
+            value if (value := getattr(noise, name)) >= 0 else DEFAULTS[name.replace("_", "-")]
             for name in ("gyro_noise", "accel_noise", "gyro_walk", "accel_walk")
         ]
         seen = [_white(readings, x) for x in (readings.w_B_radps, readings.a_B_mps2)]
