@@ -189,11 +189,14 @@ class Fit:
 
         The latter is for drives that show little of it.
         """
-        sigma = float(self.sigma[which])
+        told = float(self._known[which, which])  # by no block: it is not doubted
+        shown = max(float(self.covariance[which, which]) - told, 0.0)
+        sigma = float(np.sqrt(self.beyond_doubt**2 * shown + told))
         if self.strength(which) < STRONG:
             d2 = self.beside([which], np.zeros(1))
-            sigma = max(sigma, abs(float(self.x[which])) / float(np.sqrt(d2 + 1e-12)))
-        return self.beyond_doubt * sigma
+            by_zero = abs(float(self.x[which])) / float(np.sqrt(d2 + 1e-12))
+            sigma = max(sigma, self.beyond_doubt * by_zero)
+        return sigma
 
     def covariance_known(self, which: Sequence[int]) -> Floats:
         """Returns their covariance likewise; UNTOLD is added where the drive shows nothing."""
