@@ -88,7 +88,8 @@ static void enforce_min_range(plr_real q[3]) {
         q[2] = PLR_MIN_RANGE;
 }
 
-/* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
+/* W^T, 6 x dim, where the motion's noise is JL before it: rows JL of the pose, G JL of the landmarks,
+ * G = Jw(q) [-I | [q]x] Ad(T_CB). */
 static void fill_W(const plr_belief *belief, const plr_camera_model *camera,
                    const plr_real JL[PLR_POSE_SQUARE], plr_real *Wt, size_t ld) {
     const unsigned n = plr_covariance_dim(belief), first = plr_covariance_row(belief, 0);
@@ -135,23 +136,29 @@ static bool body_look(const plr_belief *belief, const plr_camera_model *camera, 
                       plr_view *view) {
     PLR_ASSERT(slot < belief->count);
     memcpy(view->q, belief->slots[slot].x, sizeof view->q);
+    plr_se3_move_back(view->q, belief->held.E_C, belief->held.p_C);
     return view->q[2] >= camera->min_depth;
 }
 
-/* H = Dz Ji(q), Ji = [r N | -r q]. */
+/* H = Dz R^T Ji(q) with Ji = [r N | -r q], q being where the landmark stands and R^T (q - p) where the held motion
+ * takes it: along q the pixels change by Dz R^T q = Dz R^T (q - p) + Dz R^T p. */
 static void body_derive(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                         const plr_view *view, const plr_real Dz[9], const plr_real along[3],
                         plr_real z[3], plr_rows *H) {
     PLR_ASSERT(slot < belief->count);
     (void)camera;
+    const plr_held_motion *held = &belief->held;
     plr_polar chart;
-    plr_polar_at(&chart, view->q);
+    plr_real R[9], DzRt[9];
+    plr_polar_at(&chart, belief->slots[slot].x);
+    plr_se3_rotation(R, held->E_C);
+    plr_mat3_mul_nt(DzRt, Dz, R);
     H->terms = 0;
     plr_real *h = plr_rows_add(H, plr_covariance_row(belief, slot), PLR_LANDMARK_DIM);
     for (int row = 0; row < 3; row++, h += 3) {
         for (int column = 0; column < 2; column++)
-            h[column] = chart.r * plr_dot3(Dz + 3 * row, chart.N[column]);
-        h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
+            h[column] = chart.r * plr_dot3(DzRt + 3 * row, chart.N[column]);
+        h[2] = -chart.r * (along[row] / view->q[2] + plr_dot3(DzRt + 3 * row, held->p_C));
         z[row] = PLR_FMA(h[2], belief->slots[slot].beyond, z[row]);
     }
 }
@@ -225,8 +232,8 @@ static PLR_SELDOM bool body_adopt(const plr_belief *belief, const plr_camera_mod
 
 /* A rigid motion that the corrections of some landmarks have in common. */
 typedef struct plr_common_motion {
-    plr_real eta[PLR_POSE_DIM]; /* of the body */
-    plr_real E[9], R[9], p[3];  /* of the camera: Exp(eta_C), R = I + E */
+    plr_real eta[PLR_POSE_DIM]; /* of the body, before the held motion */
+    plr_real E[9], R[9], p[3];  /* of the camera, after it: Exp(eta_C), R = I + E */
 } plr_common_motion;
 
 /* With an IMU, landmarks out of sight share another motion: the frame that finds the velocity after
@@ -239,14 +246,14 @@ static unsigned sight_of(const plr_belief *belief, unsigned slot) {
                                                                             : IN_SIGHT;
 }
 
-/* The rigid motions eta of the body that the landmarks' corrections have in common. They differ
+/* The rigid motions eta of the body, before the held one, that the landmarks' corrections have in common. They differ
  * from the pose's correction xi, which may mostly concern the way before, in which no visible
  * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
  * causes. Known landmarks are left out: they are fixed in the world, and the common part of a map's
  * errors is no motion. J becomes chart_by_body_twist of every slot. */
 static void find_common_motions(const plr_belief *belief, const plr_camera_model *camera,
-                                const plr_noise *noise, const plr_real *dx, plr_real *J,
-                                plr_common_motion common[SIGHTS]) {
+                                const plr_noise *noise, const plr_real A[PLR_POSE_SQUARE],
+                                const plr_real *dx, plr_real *J, plr_common_motion common[SIGHTS]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
     const bool parted = plr_has_block(belief, PLR_BLOCK_VELOCITY);
     const plr_real baseline = camera->given.baseline;
@@ -264,10 +271,11 @@ static void find_common_motions(const plr_belief *belief, const plr_camera_model
     }
     for (unsigned sight = 0; sight < (parted ? SIGHTS : 1); sight++) {
         plr_common_motion *m = &common[sight];
-        plr_real eta_C[PLR_POSE_DIM];
+        plr_real after[PLR_POSE_DIM], eta_C[PLR_POSE_DIM];
         plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : dx,
                             noise->motion_variance, angle2, m->eta);
-        plr_mat6_vec(eta_C, camera->Ad_CB, m->eta);
+        plr_mat6_vec(after, A, m->eta);
+        plr_mat6_vec(eta_C, camera->Ad_CB, after);
         plr_se3_expm1(m->E, m->p, eta_C);
         plr_se3_rotation(m->R, m->E);
     }
@@ -282,88 +290,103 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
     w[1] = PLR_FMA(F[4], w1, F[3] * w0);
 }
 
+/* Moves a landmark at x along the held motion, its chart and w, an error in it, too. F_D: the derivative. */
+static void move_along(plr_polar *chart, plr_real x[3], plr_real w[3], plr_real F_D[9],
+                       const plr_held_motion *held, const plr_real R[9]) {
+    const plr_polar from = *chart;
+    const plr_real before[3] = {w[0], w[1], w[2]};
+    plr_se3_move_back(x, held->E_C, held->p_C);
+    enforce_min_range(x);
+    plr_polar_at(chart, x);
+    chart_jacobian(F_D, chart, R, held->p_C, &from);
+    plr_mat3_vec(w, F_D, before);
+}
+
+/* F <- diag(M, 1) F */
+static void turn_chart(plr_real F[9], const plr_real M[4]) {
+    for (int k = 0; k < 3; k++) {
+        const plr_real f[2] = {F[k], F[3 + k]};
+        F[k] = PLR_FMA(M[1], f[1], M[0] * f[0]);
+        F[3 + k] = PLR_FMA(M[3], f[1], M[2] * f[0]);
+    }
+}
+
 /*
- * Applies the common part of the landmarks' corrections as a rigid motion eta, exactly, and the
- * rest of each through its chart, at the point to which that motion has brought the landmark:
- *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = Exp(eta_C)^-1 q,  q+ = retr(q~, w_rest).
- * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q), where theta_C is the rotation of
- * eta_C, and the pose's rows by Ad(Exp(-xi)).
+ * Moves landmarks and P once, by the motion that is held and by the correction. Each landmark first goes along the
+ * held motion, and what is left of its correction with it; then along the common part eta of all corrections,
+ * exactly; the rest goes through its chart, at the point to which that has brought the landmark:
+ *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q' = D_C^-1 q,  q~ = Exp(eta'_C)^-1 q',  q+ = retr(q~, F_D w_rest).
+ * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q') F_D, where theta_C is the rotation of
+ * eta'_C and F_D the derivative of the held motion, and the pose's rows by Ad(Exp(-xi)) A.
  */
 static unsigned body_retract(plr_belief *belief, const plr_camera_model *camera,
                              plr_workspace *work, const plr_real *dx) {
-    plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE];
+    const plr_held_motion held = belief->held;
+    plr_real R_held[9], R_xi[9], p_xi[3], xi[PLR_POSE_DIM], A_held[PLR_POSE_SQUARE],
+        A_xi[PLR_POSE_SQUARE], A[PLR_POSE_SQUARE];
     plr_common_motion both[SIGHTS];
-    plr_se3_exp(R_xi, p_xi, dx);
-    plr_se3_adjoint_inverse(A, R_xi, p_xi);
+    plr_motion_held_adjoint(belief, A_held);
+    plr_mat6_vec(xi, A_held, dx);
+    plr_se3_exp(R_xi, p_xi, xi);
+    plr_se3_adjoint_inverse(A_xi, R_xi, p_xi);
+    plr_mat6_mul(A, A_xi, A_held);
+    plr_se3_rotation(R_held, held.E_C);
     plr_real *F = work->Vt, *J = F + 9 * belief->count; /* 27 numbers a slot; Vt has at least 72 */
-    find_common_motions(belief, camera, &work->noise, dx, J, both);
+    find_common_motions(belief, camera, &work->noise, A_held, dx, J, both);
 
     unsigned cut = 0;
     for (unsigned slot = 0; slot < belief->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         const plr_common_motion *common = &both[sight_of(belief, slot)];
         plr_slot *s = &belief->slots[slot];
         plr_polar from, there, to;
-        plr_real M[4], w[3], rigid[9];
+        plr_real M[4], w[3], F_D[9], rigid[9], *own = F + 9 * slot;
         plr_polar_at(&from, s->x);
         memcpy(w, dx + plr_covariance_row(belief, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < PLR_POSE_DIM; k++)
                 w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], common->eta[k], w[i]);
         w[2] += s->beyond;
+        plr_mat3_identity(F_D);
+        if (held.any)
+            move_along(&from, s->x, w, F_D, &held, R_held);
         plr_se3_move_back(s->x, common->E, common->p);
         plr_polar_at(&there, s->x);
         chart_jacobian(rigid, &there, common->R, common->p, &from);
         turn_rest(w, rigid, &there, &from);
         cut += plr_polar_retract(&to, M, &there, w, camera->min_inverse_range, s->x, &s->beyond);
         plr_sensitivity_move_range(belief, camera, slot, there.r / to.r);
-        plr_real *own = F + 9 * slot;
-        for (int k = 0; k < 3; k++) {
-            own[k] = PLR_FMA(M[1], rigid[3 + k], M[0] * rigid[k]);
-            own[3 + k] = PLR_FMA(M[3], rigid[3 + k], M[2] * rigid[k]);
-            own[6 + k] = rigid[6 + k];
-        }
+        turn_chart(rigid, M);
+        plr_mat3_mul(own, rigid, F_D);
     }
+    memset(&belief->held, 0, sizeof belief->held);
     plr_covariance_transport(belief, work->Vt, A, F);
     return cut;
 }
 
+/* The landmarks and P stay where they are: the retraction moves them. */
 static void body_propagate(plr_belief *belief, const plr_camera_model *camera,
                            const plr_motion *motion, plr_workspace *work,
                            const plr_applied_motion *applied) {
-    plr_real E[9], R[9], p[3];
-    plr_camera_motion(E, p, &camera->given, applied->E, applied->p);
-    plr_se3_rotation(R, E);
-
-    plr_real *F = work->Vt, largest_offset = 0;
-    memset(work->dx, 0, plr_covariance_row(belief, 0) * sizeof *work->dx);
-    for (unsigned slot = 0; slot < belief->count; slot++) {
-        plr_slot *s = &belief->slots[slot];
-        plr_polar from, to;
-        const plr_real offset = move_to_linearisation_point(belief, camera, &work->noise, slot);
-        largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
-        plr_polar_at(&from, s->x);
-        plr_se3_move_back(s->x, E, p);
-        enforce_min_range(s->x);
-        plr_polar_at(&to, s->x);
-        chart_jacobian(F + 9 * slot, &to, R, p, &from);
-        plr_real *dx = work->dx + plr_covariance_row(belief, slot);
-        dx[0] = offset * F[9 * slot + 2];
-        dx[1] = offset * F[9 * slot + 5];
-        dx[2] = 0;
-        s->beyond = offset * F[9 * slot + 8];
-    }
-    plr_real A[PLR_POSE_SQUARE];
+    plr_held_motion *held = &belief->held;
+    plr_real R[9], Ad[PLR_POSE_SQUARE], JL[PLR_POSE_SQUARE];
+    memcpy(held->E, applied->E, sizeof held->E);
+    memcpy(held->p, applied->p, sizeof held->p);
+    plr_camera_motion(held->E_C, held->p_C, &camera->given, held->E, held->p);
+    held->any = 1;
+    plr_se3_rotation(R, held->E);
+    plr_se3_adjoint(Ad, R, held->p);
+    plr_mat6_mul(JL, Ad, applied->JL);          /* D' Exp(JL nu) = Exp(Ad(D') JL nu) D' */
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* the prior of the common motions */
-        work->noise.motion_variance[k] = plr_norm2_of_6(applied->JL + PLR_POSE_DIM * k);
-    plr_se3_rotation(R, applied->E);
-    plr_se3_adjoint_inverse(A, R, applied->p);
-    plr_covariance_transport(belief, work->Vt, A, F);
-    if (!motion->noisy) { /* no correction follows to which dx could be added */
-        if (largest_offset > 0)
-            (void)body_retract(belief, camera, work, work->dx);
+        work->noise.motion_variance[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
+    memset(work->dx, 0, plr_covariance_dim(belief) * sizeof *work->dx);
+    for (unsigned slot = 0; slot < belief->count; slot++)
+        belief->slots[slot].beyond =
+            move_to_linearisation_point(belief, camera, &work->noise, slot);
+    if (!motion->noisy) { /* nothing is to be told apart from P */
+        (void)body_retract(belief, camera, work, work->dx);
         return;
     }
-    fill_W(belief, camera, applied->JL, work->noise.Wt, plr_covariance_ld(belief));
+    fill_W(belief, camera, JL, work->noise.Wt, plr_covariance_ld(belief));
     plr_covariance_open_noise(belief, motion, work, applied);
 }
 
