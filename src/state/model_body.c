@@ -232,8 +232,8 @@ static PLR_SELDOM bool body_adopt(const plr_belief *belief, const plr_camera_mod
 
 /* A rigid motion that the corrections of some landmarks have in common. */
 typedef struct plr_common_motion {
-    plr_real eta[PLR_POSE_DIM]; /* of the body, before the held motion */
-    plr_real E[9], R[9], p[3];  /* of the camera, after it: Exp(eta_C), R = I + E */
+    plr_real eta[PLR_POSE_DIM]; /* of the body */
+    plr_real E[9], R[9], p[3];  /* of the camera: Exp(eta_C), R = I + E */
 } plr_common_motion;
 
 /* With an IMU, landmarks out of sight share another motion: the frame that finds the velocity after
@@ -246,14 +246,15 @@ static unsigned sight_of(const plr_belief *belief, unsigned slot) {
                                                                             : IN_SIGHT;
 }
 
-/* The rigid motions eta of the body, before the held one, that the landmarks' corrections have in common. They differ
+/* The rigid motions eta of the body that the landmarks' corrections have in common. They differ
  * from the pose's correction xi, which may mostly concern the way before, in which no visible
  * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
  * causes. Known landmarks are left out: they are fixed in the world, and the common part of a map's
- * errors is no motion. J becomes chart_by_body_twist of every slot. */
+ * errors is no motion. w: the landmarks' corrections, one after the other. J becomes chart_by_body_twist of
+ * every slot. */
 static void find_common_motions(const plr_belief *belief, const plr_camera_model *camera,
-                                const plr_noise *noise, const plr_real A[PLR_POSE_SQUARE],
-                                const plr_real *dx, plr_real *J, plr_common_motion common[SIGHTS]) {
+                                const plr_noise *noise, const plr_real xi[PLR_POSE_DIM],
+                                const plr_real *w, plr_real *J, plr_common_motion common[SIGHTS]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
     const bool parted = plr_has_block(belief, PLR_BLOCK_VELOCITY);
     const plr_real baseline = camera->given.baseline;
@@ -266,16 +267,14 @@ static void find_common_motions(const plr_belief *belief, const plr_camera_model
         plr_polar_at(&chart, belief->slots[slot].x);
         chart_by_body_twist(camera, &chart, J);
         if (!belief->slots[slot].known)
-            plr_rigid_fit_add(&fit[sight_of(belief, slot)], J,
-                              dx + plr_covariance_row(belief, slot), W);
+            plr_rigid_fit_add(&fit[sight_of(belief, slot)], J, w + PLR_LANDMARK_DIM * slot, W);
     }
     for (unsigned sight = 0; sight < (parted ? SIGHTS : 1); sight++) {
         plr_common_motion *m = &common[sight];
-        plr_real after[PLR_POSE_DIM], eta_C[PLR_POSE_DIM];
-        plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : dx,
+        plr_real eta_C[PLR_POSE_DIM];
+        plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : xi,
                             noise->motion_variance, angle2, m->eta);
-        plr_mat6_vec(after, A, m->eta);
-        plr_mat6_vec(eta_C, camera->Ad_CB, after);
+        plr_mat6_vec(eta_C, camera->Ad_CB, m->eta);
         plr_se3_expm1(m->E, m->p, eta_C);
         plr_se3_rotation(m->R, m->E);
     }
@@ -290,76 +289,90 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
     w[1] = PLR_FMA(F[4], w1, F[3] * w0);
 }
 
-/* Moves a landmark at x along the held motion, its chart and w, an error in it, too. F_D: the derivative. */
-static void move_along(plr_polar *chart, plr_real x[3], plr_real w[3], plr_real F_D[9],
-                       const plr_held_motion *held, const plr_real R[9]) {
-    const plr_polar from = *chart;
-    const plr_real before[3] = {w[0], w[1], w[2]};
-    plr_se3_move_back(x, held->E_C, held->p_C);
-    enforce_min_range(x);
-    plr_polar_at(chart, x);
-    chart_jacobian(F_D, chart, R, held->p_C, &from);
-    plr_mat3_vec(w, F_D, before);
+/* Moves the landmarks along the held motion, without P. F: the derivative of each; w: its correction there. What the
+ * estimate is beyond the point goes along as an error does. */
+static void move_along(plr_belief *belief, const plr_real *dx, plr_real *F, plr_real *w) {
+    const plr_held_motion *held = &belief->held;
+    plr_real R[9];
+    plr_se3_rotation(R, held->E_C);
+    for (unsigned slot = 0; slot < belief->count; slot++, F += 9, w += PLR_LANDMARK_DIM) {
+        plr_slot *s = &belief->slots[slot];
+        const plr_real beyond = s->beyond, *before = dx + plr_covariance_row(belief, slot);
+        plr_polar from, to;
+        if (!held->any) {
+            plr_mat3_identity(F);
+            memcpy(w, before, PLR_LANDMARK_DIM * sizeof *w);
+            continue;
+        }
+        plr_polar_at(&from, s->x);
+        plr_se3_move_back(s->x, held->E_C, held->p_C);
+        enforce_min_range(s->x);
+        plr_polar_at(&to, s->x);
+        chart_jacobian(F, &to, R, held->p_C, &from);
+        plr_mat3_vec(w, F, before);
+        w[0] = PLR_FMA(F[2], beyond, w[0]);
+        w[1] = PLR_FMA(F[5], beyond, w[1]);
+        s->beyond = F[8] * beyond;
+    }
 }
 
-/* F <- diag(M, 1) F */
-static void turn_chart(plr_real F[9], const plr_real M[4]) {
+/* F <- diag(M, 1) N F, 3x3 */
+static void turn_chart(plr_real F[9], const plr_real M[4], const plr_real N[9]) {
+    plr_real NF[9];
+    plr_mat3_mul(NF, N, F);
     for (int k = 0; k < 3; k++) {
-        const plr_real f[2] = {F[k], F[3 + k]};
-        F[k] = PLR_FMA(M[1], f[1], M[0] * f[0]);
-        F[3 + k] = PLR_FMA(M[3], f[1], M[2] * f[0]);
+        F[k] = PLR_FMA(M[1], NF[3 + k], M[0] * NF[k]);
+        F[3 + k] = PLR_FMA(M[3], NF[3 + k], M[2] * NF[k]);
+        F[6 + k] = NF[6 + k];
     }
 }
 
 /*
- * Moves landmarks and P once, by the motion that is held and by the correction. Each landmark first goes along the
- * held motion, and what is left of its correction with it; then along the common part eta of all corrections,
- * exactly; the rest goes through its chart, at the point to which that has brought the landmark:
- *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q' = D_C^-1 q,  q~ = Exp(eta'_C)^-1 q',  q+ = retr(q~, F_D w_rest).
- * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q') F_D, where theta_C is the rotation of
- * eta'_C and F_D the derivative of the held motion, and the pose's rows by Ad(Exp(-xi)) A.
+ * Moves landmarks and P, once, along the motion that is held and by the correction. At the end of the motion the common
+ * part of the landmarks' corrections is applied as a rigid motion eta, exactly, and the
+ * rest of each through its chart, at the point to which eta has brought the landmark:
+ *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = Exp(eta_C)^-1 q,  q+ = retr(q~, w_rest).
+ * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q) F, where theta_C is the rotation of
+ * eta_C and F the derivative of the held motion, and the pose's rows by Ad(Exp(-xi)) A.
  */
 static unsigned body_retract(plr_belief *belief, const plr_camera_model *camera,
                              plr_workspace *work, const plr_real *dx) {
-    const plr_held_motion held = belief->held;
-    plr_real R_held[9], R_xi[9], p_xi[3], xi[PLR_POSE_DIM], A_held[PLR_POSE_SQUARE],
-        A_xi[PLR_POSE_SQUARE], A[PLR_POSE_SQUARE];
+    plr_real R_xi[9], p_xi[3], xi[PLR_POSE_DIM], A[PLR_POSE_SQUARE], by_xi[PLR_POSE_SQUARE],
+        by_both[PLR_POSE_SQUARE];
     plr_common_motion both[SIGHTS];
-    plr_motion_held_adjoint(belief, A_held);
-    plr_mat6_vec(xi, A_held, dx);
+    plr_motion_held_adjoint(belief, A);
+    plr_mat6_vec(xi, A, dx);
     plr_se3_exp(R_xi, p_xi, xi);
-    plr_se3_adjoint_inverse(A_xi, R_xi, p_xi);
-    plr_mat6_mul(A, A_xi, A_held);
-    plr_se3_rotation(R_held, held.E_C);
-    plr_real *F = work->Vt, *J = F + 9 * belief->count; /* 27 numbers a slot; Vt has at least 72 */
-    find_common_motions(belief, camera, &work->noise, A_held, dx, J, both);
+    plr_se3_adjoint_inverse(by_xi, R_xi, p_xi);
+    plr_mat6_mul(by_both, by_xi, A);
+    plr_real *F = work->Vt, *J = F + 9 * belief->count; /* 30 numbers a slot; Vt has at least 72 */
+    plr_real *w = J + PLR_ROWS * PLR_POSE_DIM * belief->count;
+    move_along(belief, dx, F, w);
+    find_common_motions(belief, camera, &work->noise, xi, w, J, both);
 
     unsigned cut = 0;
-    for (unsigned slot = 0; slot < belief->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
+    for (unsigned slot = 0; slot < belief->count; slot++) {
         const plr_common_motion *common = &both[sight_of(belief, slot)];
         plr_slot *s = &belief->slots[slot];
         plr_polar from, there, to;
-        plr_real M[4], w[3], F_D[9], rigid[9], *own = F + 9 * slot;
+        plr_real M[4], rigid[9];
         plr_polar_at(&from, s->x);
-        memcpy(w, dx + plr_covariance_row(belief, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < PLR_POSE_DIM; k++)
                 w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], common->eta[k], w[i]);
         w[2] += s->beyond;
-        plr_mat3_identity(F_D);
-        if (held.any)
-            move_along(&from, s->x, w, F_D, &held, R_held);
         plr_se3_move_back(s->x, common->E, common->p);
         plr_polar_at(&there, s->x);
         chart_jacobian(rigid, &there, common->R, common->p, &from);
         turn_rest(w, rigid, &there, &from);
         cut += plr_polar_retract(&to, M, &there, w, camera->min_inverse_range, s->x, &s->beyond);
         plr_sensitivity_move_range(belief, camera, slot, there.r / to.r);
-        turn_chart(rigid, M);
-        plr_mat3_mul(own, rigid, F_D);
+        turn_chart(F + 9 * slot, M, rigid);
+        J += PLR_ROWS * PLR_POSE_DIM;
+        w += PLR_LANDMARK_DIM;
     }
     memset(&belief->held, 0, sizeof belief->held);
-    plr_covariance_transport(belief, work->Vt, A, F);
+    plr_covariance_transport(belief, work->Vt, by_both, F);
     return cut;
 }
 
@@ -377,7 +390,7 @@ static void body_propagate(plr_belief *belief, const plr_camera_model *camera,
     plr_se3_adjoint(Ad, R, held->p);
     plr_mat6_mul(JL, Ad, applied->JL);          /* D' Exp(JL nu) = Exp(Ad(D') JL nu) D' */
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* the prior of the common motions */
-        work->noise.motion_variance[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
+        work->noise.motion_variance[k] = plr_norm2_of_6(applied->JL + PLR_POSE_DIM * k);
     memset(work->dx, 0, plr_covariance_dim(belief) * sizeof *work->dx);
     for (unsigned slot = 0; slot < belief->count; slot++)
         belief->slots[slot].beyond =

@@ -86,7 +86,7 @@ void textbook_pose_covariance(const textbook *t, double P_xi[36]) {
 
 void body_beyond(const textbook_landmark *l, double e[3]) {
     for (int k = 0; k < 3; k++)
-        e[k] = l->across[k] - norm3(l->x) * l->beyond * l->x[k];
+        e[k] = -norm3(l->x) * l->beyond * l->x[k];
 }
 
 void body_polar_step(const double q[3], const double e[3], double moved[3], double J[9]) {
@@ -155,23 +155,24 @@ static void move_to_linearisation_point(const textbook *t, textbook_landmark *l,
     l->beyond -= (ratio - 1) / r;
 }
 
-/* Splits what is beyond a landmark, an error of its point, into the part across its ray and that along it,
- * as an inverse range. */
-static void split_error(textbook_landmark *l, const double e[3]) {
+/* Splits an error of a point into the part across its ray, which stays in e, and that along it, as an
+ * inverse range. */
+static void split_error(textbook_landmark *l, double e[3]) {
     const double r = norm3(l->x);
     const double along = (l->x[0] * e[0] + l->x[1] * e[1] + l->x[2] * e[2]) / r;
     for (int k = 0; k < 3; k++)
-        l->across[k] = e[k] - along * l->x[k] / r;
+        e[k] -= along * l->x[k] / r;
     l->beyond = -along / (r * r);
 }
 
-/* Landmarks along with a motion D of the body: `blocks` takes how their errors go. */
+/* Landmarks along with a motion D of the body: `blocks` takes how their errors go, `correction` what
+ * the prior says of them. */
 static void move_landmarks(textbook *t, const double D[16]) {
     double back[16], R_back[9];
     camera_back(t, D, back, R_back);
     for (unsigned i = 0; i < t->count; i++) {
         textbook_landmark *l = &t->landmarks[i];
-        double J[9], beyond[3], turned[3];
+        double J[9], beyond[3], *e = t->correction + textbook_row(t, i);
         move_to_linearisation_point(t, l, J);
         body_beyond(l, beyond);
         rigid_apply(l->x, back, l->x);
@@ -179,11 +180,17 @@ static void move_landmarks(textbook *t, const double D[16]) {
         for (int k = 0; range < min_range && k < 3; k++) /* the camera has run into it */
             l->x[k] = range > 0 ? l->x[k] * min_range / range : (k == 2 ? min_range : 0);
         square_multiply(3, R_back, J, t->blocks + 9 * (size_t)i);
-        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, R_back, beyond, 0, turned);
-        split_error(l, turned);
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, R_back, beyond, 0, e);
+        split_error(l, e);
     }
-    memcpy(t->applied, D, sizeof t->applied);
-    t->moved = true;
+}
+
+/* Is there a correction that no observation has made, of landmarks that are too far away? */
+static bool is_left(const textbook *t) {
+    bool left = false;
+    for (unsigned i = 0; i < textbook_dim(t); i++)
+        left = left || t->correction[i] < 0 || t->correction[i] > 0;
+    return left;
 }
 
 static void clear_correction(textbook *t) {
@@ -200,7 +207,8 @@ void body_move(textbook *t, const double D[16]) {
     clear_correction(t);
     move_landmarks(t, D);
     transport_covariance(t, POSE, A, t->blocks);
-    body_retract(t);
+    if (is_left(t))
+        body_retract(t);
 }
 
 /* F C: the shared part of the state after F = diag(A, I, blocks). */
@@ -220,8 +228,7 @@ static void turn_shared(textbook *t, const double A[36]) {
  *   mean <- F mean - G n,  P <- F P F^T + F Cov(x, n) G^T + (...)^T + G L L^T G^T,  G = G_0 Jr(n). */
 static void apply_motion(textbook *t, const search_result *found) {
     const unsigned n = textbook_dim(t);
-    double motion[6], E[16], T[16], D[16], Jr[36], M[36], JMJ[36], A[36], back[16], K[18], Ad[36],
-        before[36];
+    double motion[6], E[16], T[16], D[16], Jr[36], M[36], JMJ[36], A[36], back[16], K[18];
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, found->L, found->z, 0, motion);
     oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, 6, 6, 6, 0.5, found->L, found->L, 0, M);
     rigid_exp(E, motion);
@@ -233,10 +240,8 @@ static void apply_motion(textbook *t, const search_result *found) {
     rigid_inverse(back, D);
     rigid_adjoint(A, back);
     clear_correction(t);
-    rigid_adjoint(Ad, D);
-    oracle_sandwich(6, 6, Ad, JMJ, before);
     for (unsigned k = 0; k < 6; k++)
-        t->motion_variance[k] = 2 * before[7 * k];
+        t->motion_variance[k] = 2 * JMJ[7 * k];
     move_landmarks(t, D);
     memset(t->noise, 0, 6 * (size_t)n * sizeof *t->noise);
     memcpy(t->noise, Jr, sizeof Jr);
@@ -288,7 +293,8 @@ void body_settle(textbook *t) {
         t->landmarks[i].range_shift = 0;
     search_prior(t, found.L);
     apply_motion(t, &found);
-    body_retract(t);
+    if (is_left(t))
+        body_retract(t);
 }
 
 /* ---------------------------------------------------------------- corrections */
@@ -361,7 +367,6 @@ static void retract_landmark(textbook *t, unsigned landmark, const double eta[6]
     body_beyond(l, beyond);
     for (unsigned k = 0; k < 3; k++)
         e[k] = t->correction[textbook_row(t, landmark) + k] + beyond[k];
-    memset(l->across, 0, sizeof l->across);
     body_along(t, eta, back, l->x, e);
     l->beyond = limit_step(t, l->x, e);
     body_polar_step(l->x, e, moved, J);
@@ -369,36 +374,14 @@ static void retract_landmark(textbook *t, unsigned landmark, const double eta[6]
     memcpy(l->x, moved, sizeof moved);
 }
 
-/* eta, fitted where the landmarks were before the motion that this frame has applied, and carried along it. */
-static void find_common_motion(const textbook *t, double eta[6]) {
-    double D[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    double back[16], R_back[9], D_C[16], R[9], Ad[36], A[36], xi[6], before[6];
-    body_fit fit = {.A = {0}};
-    if (t->moved)
-        memcpy(D, t->applied, sizeof D);
-    camera_back(t, D, back, R_back);
-    rigid_inverse(D_C, back);
-    rigid_rotation(R, D_C);
-    for (unsigned i = 0; i < t->count; i++) {
-        double q[3], e[3];
-        rigid_apply(q, D_C, t->landmarks[i].x);
-        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, R, t->correction + textbook_row(t, i),
-                    0, e);
-        if (!t->landmarks[i].known)
-            body_fit_add(t, &fit, q, e);
-    }
-    rigid_adjoint(Ad, D);
-    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, Ad, t->correction, 0, xi);
-    body_fit_solve(t, &fit, xi, before);
-    rigid_inverse(back, D);
-    rigid_adjoint(A, back);
-    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, A, before, 0, eta);
-}
-
 void body_retract(textbook *t) {
     const double *d = t->correction;
     double eta[6], eta_C[6], E[16], back[16], pose[16], pose_back[16], A[36];
-    find_common_motion(t, eta);
+    body_fit fit = {.A = {0}};
+    for (unsigned i = 0; i < t->count; i++)
+        if (!t->landmarks[i].known)
+            body_fit_add(t, &fit, t->landmarks[i].x, d + textbook_row(t, i));
+    body_fit_solve(t, &fit, d, eta);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, t->Ad_CB, eta, 0, eta_C);
     rigid_exp(E, eta_C);
     rigid_inverse(back, E);
@@ -407,6 +390,5 @@ void body_retract(textbook *t) {
     rigid_adjoint(A, pose_back);
     for (unsigned i = 0; i < t->count; i++)
         retract_landmark(t, i, eta, back, t->blocks + 9 * (size_t)i);
-    t->moved = false;
     transport_covariance(t, POSE, A, t->blocks);
 }

@@ -33,8 +33,6 @@ enum { TEXTBOOK_ROWS = 4 }; /* of an observation: uL, vL, uR, vR */
 typedef struct textbook_landmark {
     double x[3];   /* `world`: m in the world; `body`: q in the left camera; m */
     double beyond; /* `body`: the estimate's inverse range less the point's, 1/m: of far points */
-    double across
-        [3]; /* `body`: what a motion has turned of that across the ray, until the retraction */
     double range_shift, d2,
         norm2; /* `body`: what a frame makes of it before it is corrected (search.h) */
     uint32_t id, times_seen, times_gated;
@@ -67,10 +65,8 @@ typedef struct textbook {
     double *rows;       /* H P: 4 most_seen x n */
     double *pose, *own; /* rows of P, whole: the pose's six and one landmark's three */
     double *S, *innovation, *correction;
-    double *noise, *shared; /* `body`: n x 6 each */
-    bool moved;             /* `body`: this frame has applied a motion, `applied` */
-    double applied[16];
-    double motion_variance[6]; /* of it, before it */
+    double *noise, *shared;    /* `body`: n x 6 each */
+    double motion_variance[6]; /* `body`: variances of the motion that this frame has applied */
     double *blocks;            /* `body`: 3x3 a landmark */
     unsigned *matched;         /* landmark of each observation, count where there is none */
     struct textbook_sighting *sightings; /* `body`: most_seen (search.h) */
