@@ -71,7 +71,8 @@ bool plr_covariance_is_positive(const plr_belief *belief);
 
 /* --- motion --- */
 
-/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. F may
+/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back; the sensitivity of the
+ * landmarks is the caller's. F may
  * stand at the beginning of work.Vt; the next 21 numbers a landmark there are used. */
 void plr_covariance_transport(plr_belief *belief, plr_real *Vt, const plr_real A[PLR_POSE_SQUARE],
                               const plr_real *F);

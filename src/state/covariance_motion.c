@@ -118,7 +118,6 @@ void plr_covariance_transport(plr_belief *belief, plr_real *Vt, const plr_real A
         plr_blocks3_widen(belief->count, F, by.Gt);
     for (unsigned slot = 0; slot < belief->count; slot++)
         transport_landmark(belief, slot, At, &by);
-    plr_sensitivity_turn_landmarks(belief, F);
 }
 
 void plr_covariance_motion_share(const plr_belief *belief, unsigned row,

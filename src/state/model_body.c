@@ -289,8 +289,8 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
     w[1] = PLR_FMA(F[4], w1, F[3] * w0);
 }
 
-/* Moves the landmarks along the held motion, without P. F: the derivative of each; w: its correction there. What the
- * estimate is beyond the point goes along as an error does. */
+/* Moves the landmarks and their sensitivity along the held motion, without P. F: the derivative of each; w: its
+ * correction there. What the estimate is beyond the point goes along as an error does. */
 static void move_along(plr_belief *belief, const plr_real *dx, plr_real *F, plr_real *w) {
     const plr_held_motion *held = &belief->held;
     plr_real R[9];
@@ -309,6 +309,7 @@ static void move_along(plr_belief *belief, const plr_real *dx, plr_real *F, plr_
         enforce_min_range(s->x);
         plr_polar_at(&to, s->x);
         chart_jacobian(F, &to, R, held->p_C, &from);
+        plr_sensitivity_turn_landmark(belief, slot, F);
         plr_mat3_vec(w, F, before);
         w[0] = PLR_FMA(F[2], beyond, w[0]);
         w[1] = PLR_FMA(F[5], beyond, w[1]);
@@ -316,14 +317,12 @@ static void move_along(plr_belief *belief, const plr_real *dx, plr_real *F, plr_
     }
 }
 
-/* F <- diag(M, 1) N F, 3x3 */
-static void turn_chart(plr_real F[9], const plr_real M[4], const plr_real N[9]) {
-    plr_real NF[9];
-    plr_mat3_mul(NF, N, F);
+/* F <- diag(M, 1) F, 3x3 */
+static void turn_chart(plr_real F[9], const plr_real M[4]) {
     for (int k = 0; k < 3; k++) {
-        F[k] = PLR_FMA(M[1], NF[3 + k], M[0] * NF[k]);
-        F[3 + k] = PLR_FMA(M[3], NF[3 + k], M[2] * NF[k]);
-        F[6 + k] = NF[6 + k];
+        const plr_real f[2] = {F[k], F[3 + k]};
+        F[k] = PLR_FMA(M[1], f[1], M[0] * f[0]);
+        F[3 + k] = PLR_FMA(M[3], f[1], M[2] * f[0]);
     }
 }
 
@@ -355,7 +354,7 @@ static unsigned body_retract(plr_belief *belief, const plr_camera_model *camera,
         const plr_common_motion *common = &both[sight_of(belief, slot)];
         plr_slot *s = &belief->slots[slot];
         plr_polar from, there, to;
-        plr_real M[4], rigid[9];
+        plr_real M[4], rigid[9], along[9];
         plr_polar_at(&from, s->x);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < PLR_POSE_DIM; k++)
@@ -367,7 +366,10 @@ static unsigned body_retract(plr_belief *belief, const plr_camera_model *camera,
         turn_rest(w, rigid, &there, &from);
         cut += plr_polar_retract(&to, M, &there, w, camera->min_inverse_range, s->x, &s->beyond);
         plr_sensitivity_move_range(belief, camera, slot, there.r / to.r);
-        turn_chart(F + 9 * slot, M, rigid);
+        turn_chart(rigid, M);
+        plr_sensitivity_turn_landmark(belief, slot, rigid);
+        memcpy(along, F + 9 * slot, sizeof along);
+        plr_mat3_mul(F + 9 * slot, rigid, along);
         J += PLR_ROWS * PLR_POSE_DIM;
         w += PLR_LANDMARK_DIM;
     }
