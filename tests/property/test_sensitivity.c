@@ -230,17 +230,17 @@ static void hold_against_others(void (*run)(const belief *, double, outcome *), 
 
 static void test_twists_with_biases(void) {
     rig.config.bias = 1;
-    hold_against_others(drive, 5e-4);
+    hold_against_others(drive, 1e-3);
 }
 
 static void test_twists_without_biases(void) {
     rig.config.bias = 0;
-    hold_against_others(drive, 5e-4);
+    hold_against_others(drive, 1e-3);
 }
 
 static void test_the_world_model(void) {
     rig.config.model = PLR_MODEL_WORLD;
-    hold_against_others(drive, 5e-4);
+    hold_against_others(drive, 1e-3);
 }
 
 static void test_an_imu(void) {
