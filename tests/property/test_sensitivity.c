@@ -16,7 +16,8 @@
 
 enum { MOST_LANDMARKS = 40, FRAMES = 30 };
 
-/* By which the believed number is varied, either way: so little that no test contradicts it. */
+/* By which the believed number is varied, either way: so little that no test contradicts it, and more than
+ * float32 rounds in a landmark. */
 static double step_of_belief;
 static const double SIGMA = 0.05;
 static const double ROUNDING = PLR_REAL == 32 ? 0.05 : 0.02; /* of the largest element of a block */
