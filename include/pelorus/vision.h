@@ -54,6 +54,11 @@ typedef struct plr_expected {
     plr_pose motion;
     const plr_depth *depths; /* or NULL */
     uint16_t depth_count;
+    /* How C moves at the time of this pair, in its own axes: what is not taken at the frame's time, rows of a
+     * rolling shutter and a half that is late, is moved by it. Else the mean since the last pair must do, which is
+     * older by half the time between them. */
+    bool velocity_known;
+    double v_C_mps[3], w_C_radps[3];
 } plr_expected;
 
 /* --- what comes out --- */
@@ -242,7 +247,7 @@ plr_status plr_vision_forget(plr_vision *v);
  * PLR_E_NOT_READY no init; PLR_E_ARGUMENT a null pointer, a stride below the width, or pictures of another
  * size than the rig's: they are not those of its calibration; PLR_E_TIME not later than the last pair, or
  * halves more than a quarter second apart; PLR_E_NOT_FINITE, PLR_E_RANGE the expected motion is not finite,
- * no rotation, or more than 100 m. After an error nothing has changed. */
+ * no rotation, or more than 100 m, 1,000 m/s or 100 rad/s. After an error nothing has changed. */
 plr_status plr_vision_track(plr_vision *v, const plr_picture_pair *pair,
                             const plr_expected *expected, plr_frame *frame);
 

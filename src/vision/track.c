@@ -218,10 +218,8 @@ static plr_real slope_prior(const plr_vision *v, const plr_track *t) {
     return by * by;
 }
 
-/* slope <- the mean of what a fit measures, of the older fits, which count less and less, and of the prior,
- * which is not forgotten: a slope that fits do not tell tends to that of a surface that faces the camera. */
-static void weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
-                        const plr_real measured[2], const plr_real fit[3]) {
+void plr_track_weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
+                           const plr_real measured[2], const plr_real fit[3]) {
     const plr_real was[2] = {PLR_FMA(prior + info[0], slope[0], info[1] * slope[1]),
                              PLR_FMA(prior + info[2], slope[1], info[1] * slope[0])};
     const plr_real is[2] = {PLR_FMA(fit[0], measured[0], fit[1] * measured[1]),
@@ -261,7 +259,7 @@ static void learn_slope(const plr_vision *v, const plr_scene *s, const uint8_t *
     for (int i = 0; i < 3; i++)
         info[i] *= SLOPE_SHARE;
     const plr_real measured[2] = {t->surface.slope[0] + change[0], t->surface.slope[1] + change[1]};
-    weigh_slope(t->surface.slope, t->slope_info, slope_prior(v, t), measured, info);
+    plr_track_weigh_slope(t->surface.slope, t->slope_info, slope_prior(v, t), measured, info);
 }
 
 /* Fits the right picture with the patch deformed as the surface lies, and learns how it does. */
