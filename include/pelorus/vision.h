@@ -137,8 +137,7 @@ typedef struct plr_optics {
 enum {
     PLR_PATCH_SIDE = 9,                  /* of what is compared, px */
     PLR_PATCH_KEPT = PLR_PATCH_SIDE + 2, /* with a margin for its gradients */
-    PLR_PATCH_BYTES = PLR_PATCH_KEPT * PLR_PATCH_KEPT,
-    PLR_VISION_CELLS = 20 * 20 /* most cells, of which each can show a corner */
+    PLR_PATCH_BYTES = PLR_PATCH_KEPT * PLR_PATCH_KEPT
 };
 
 /* A small piece of a surface, seen in the left picture. */
@@ -169,12 +168,6 @@ typedef struct plr_track {
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
 } plr_track;
 
-/* A corner that could be followed. */
-typedef struct plr_corner {
-    float score;   /* smaller eigenvalue of the structure tensor */
-    uint16_t u, v; /* in the left picture */
-} plr_corner;
-
 /* Rows that differ, beside those that the expected turn would make differ in a second: sums. */
 typedef struct plr_row_gaps {
     plr_real count, rate, gap, rate2, gap_rate, gap2;
@@ -194,8 +187,7 @@ typedef struct plr_vision {
     uint32_t next_id, hash[2], proper, mirrored;
     plr_row_gaps gaps;
     plr_track tracks[PLR_VISION_TRACKS];
-    uint16_t track_count, corner_count, shown;
-    plr_corner corners[PLR_VISION_CELLS];
+    uint16_t track_count, shown;
     uint8_t pyramid[2][PLR_VISION_PIXELS / 3 + 1]; /* all levels but the pictures themselves */
     /* To be read, until the next call: */
     plr_vision_report report;

@@ -216,13 +216,14 @@ static bool begin(plr_vision *v, const plr_scene *s, const plr_real at[2], plr_r
 }
 
 static void fill(plr_vision *v, const plr_scene *s) {
+    plr_corner corners[PLR_CORNERS];
     if (v->track_count >= v->wanted)
         return;
-    plr_corners_find(v, &s->side[PLR_LEFT]);
+    const unsigned n = plr_corners_find(v, &s->side[PLR_LEFT], corners);
     const plr_real apart = (plr_real)plr_cells_of(v->width, v->height).side_px / 2;
     unsigned tries = 2U * (unsigned)(v->wanted - v->track_count) + MORE_TRIES;
-    for (unsigned i = 0; i < v->corner_count && v->track_count < v->wanted && tries > 0; i++) {
-        const plr_real at[2] = {(plr_real)v->corners[i].u, (plr_real)v->corners[i].v};
+    for (unsigned i = 0; i < n && v->track_count < v->wanted && tries > 0; i++) {
+        const plr_real at[2] = {(plr_real)corners[i].u, (plr_real)corners[i].v};
         if (is_taken(v, at, apart))
             continue;
         tries--;
@@ -292,6 +293,7 @@ static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
         v->observations[n] = o;
         v->sights[n++] = sight;
     }
+    plr_watch_rows(v, &s->motion, n);
     frame->count = (uint16_t)leave_out_strays(v, n);
 }
 
@@ -317,7 +319,6 @@ static void look(plr_vision *v, const plr_scene *s, const plr_expected *e, plr_f
     if (!(v->report.right & PLR_PICTURE_UNUSABLE))
         fill(v, s);
     v->report.swapped = v->mirrored >= SWAPPED_AFTER && v->mirrored > 3 * v->proper;
-    plr_watch_rows(v, &s->motion);
     hand_out(v, s, frame);
 }
 
