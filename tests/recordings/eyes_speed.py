@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from typing import Any
 
 import cv2
 import judge
@@ -30,14 +30,7 @@ import eyes
 
 Pair = tuple[eyes.Gray, eyes.Gray]
 SETTINGS = Settings()
-WINDOW = {"winSize": (SETTINGS.window_px, SETTINGS.window_px), "maxLevel": LEVELS}
-
-
-def timed(call: Callable[[], object]) -> float:
-    """Returns the time that a call took of this thread, ms."""
-    begin = time.thread_time_ns()
-    call()
-    return (time.thread_time_ns() - begin) * 1e-6
+WINDOW = SETTINGS.window_px, SETTINGS.window_px
 
 
 def own(tracker: Tracker, t_ns: list[int], pairs: list[Pair], turns: list[Floats]) -> list[float]:
@@ -46,9 +39,9 @@ def own(tracker: Tracker, t_ns: list[int], pairs: list[Pair], turns: list[Floats
     motion = [None, *((turn, np.zeros(3)) for turn in turns)]
     found = []
     for t, pair, moved in zip(t_ns, pairs, motion, strict=True):
-        found.append(
-            timed(lambda t=t, pair=pair, moved=moved: tracker.track(t, *pair, motion=moved))
-        )
+        begin = time.thread_time_ns()
+        tracker.track(t, *pair, motion=moved)
+        found.append((time.thread_time_ns() - begin) * 1e-6)
     return found
 
 
@@ -57,24 +50,14 @@ def opencv(pairs: list[Pair], points: int) -> tuple[list[float], list[float]]:
     corners, passes = [], []
     last = pairs[0][0]
     for left, right in pairs:
-        seen: list[Floats] = []
-
-        def look(left: eyes.Gray = left, seen: list[Floats] = seen) -> None:
-            seen.append(cv2.goodFeaturesToTrack(left, points, QUALITY, SETTINGS.spacing_px))
-
-        corners.append(timed(look))
-        at = seen[0].astype(np.float32)
-
-        def follow(
-            last: eyes.Gray = last,
-            left: eyes.Gray = left,
-            right: eyes.Gray = right,
-            at: Floats = at,
-        ) -> None:
-            cv2.calcOpticalFlowPyrLK(last, left, at, None, **WINDOW)
-            cv2.calcOpticalFlowPyrLK(left, right, at, None, **WINDOW)
-
-        passes.append(timed(follow))
+        begin = time.thread_time_ns()
+        found: Any = cv2.goodFeaturesToTrack(left, points, QUALITY, SETTINGS.spacing_px)
+        middle = time.thread_time_ns()
+        for one, other in ((last, left), (left, right)):
+            nowhere: Any = None
+            cv2.calcOpticalFlowPyrLK(one, other, found, nowhere, winSize=WINDOW, maxLevel=LEVELS)
+        corners.append((middle - begin) * 1e-6)
+        passes.append((time.thread_time_ns() - middle) * 1e-6)
         last = left
     return corners, passes
 
