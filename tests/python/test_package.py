@@ -165,7 +165,7 @@ def test_every_command_works_from_the_wheel_alone(own_wheel: Path, tmp_path: Pat
 
     assert str(site) in said("-c", "import pelorus; print(pelorus.__file__)")
     for words in (
-        "simulate d.plr --duration 6",
+        "simulate d.plr --duration 3",
         "info d.plr",
         "check d.plr",
         "evaluate d.plr",
