@@ -49,6 +49,15 @@ typedef struct plr_slot {
     uint16_t rejected;          /* successive frames in which the gate rejected it */
 } plr_slot;
 
+/* A motion that the pose has made, while landmarks and covariance still stand where they were before it:
+ * from the beginning of a correction to its retraction, which moves them once for both (docs/MATH.md 10).
+ * Between calls there is none, and all of it is zero. */
+typedef struct plr_held_motion {
+    plr_real E[9], p[3];     /* of the body: (I + E, p) */
+    plr_real E_C[9], p_C[3]; /* the same of the left camera */
+    uint8_t any;             /* 1: there is one */
+} plr_held_motion;
+
 /* What is believed of body and landmarks: the state with its covariance. */
 typedef struct plr_belief {
     plr_layout layout; /* layout, model and capacity never change after init */
@@ -68,6 +77,7 @@ typedef struct plr_belief {
                                                         plr_layout, landmarks */
     plr_real S[PLR_CALIBRATIONS][PLR_MAX_LD];        /* the error of each row of P by those of the
                                                  calibration, relative: src/state/sensitivity.h */
+    plr_held_motion held;
 } plr_belief;
 
 /* What velocity and biases do in the same time, with an IMU (docs/MATH.md 19): the velocity becomes V

@@ -26,6 +26,10 @@
 extern "C" {
 #endif
 
+/* So well an IMU's velocity must be known to say where points will be, m/s: in a pair's time a body changes
+ * its own by as much, and then a track's last drift tells it as well. */
+#define PLR_EYES_SPEED_SIGMA 0.1
+
 /* The motion of the body since the last pair, by what the filter says of its velocity. */
 typedef struct plr_eyes_motion {
     bool known;          /* the filter has moved since HEADER */

@@ -54,6 +54,11 @@ typedef struct plr_expected {
     plr_pose motion;
     const plr_depth *depths; /* or NULL */
     uint16_t depth_count;
+    /* How C moves at the time of this pair, in its own axes: what is not taken at the frame's time, rows of a
+     * rolling shutter and a half that is late, is moved by it. Else the mean since the last pair must do, which is
+     * older by half the time between them. */
+    bool velocity_known;
+    double v_C_mps[3], w_C_radps[3];
 } plr_expected;
 
 /* --- what comes out --- */
@@ -132,8 +137,7 @@ typedef struct plr_optics {
 enum {
     PLR_PATCH_SIDE = 9,                  /* of what is compared, px */
     PLR_PATCH_KEPT = PLR_PATCH_SIDE + 2, /* with a margin for its gradients */
-    PLR_PATCH_BYTES = PLR_PATCH_KEPT * PLR_PATCH_KEPT,
-    PLR_VISION_CELLS = 20 * 20 /* most cells, of which each can show a corner */
+    PLR_PATCH_BYTES = PLR_PATCH_KEPT * PLR_PATCH_KEPT
 };
 
 /* A small piece of a surface, seen in the left picture. */
@@ -164,12 +168,6 @@ typedef struct plr_track {
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
 } plr_track;
 
-/* A corner that could be followed. */
-typedef struct plr_corner {
-    float score;   /* smaller eigenvalue of the structure tensor */
-    uint16_t u, v; /* in the left picture */
-} plr_corner;
-
 /* Rows that differ, beside those that the expected turn would make differ in a second: sums. */
 typedef struct plr_row_gaps {
     plr_real count, rate, gap, rate2, gap_rate, gap2;
@@ -189,8 +187,7 @@ typedef struct plr_vision {
     uint32_t next_id, hash[2], proper, mirrored;
     plr_row_gaps gaps;
     plr_track tracks[PLR_VISION_TRACKS];
-    uint16_t track_count, corner_count, shown;
-    plr_corner corners[PLR_VISION_CELLS];
+    uint16_t track_count, shown;
     uint8_t pyramid[2][PLR_VISION_PIXELS / 3 + 1]; /* all levels but the pictures themselves */
     /* To be read, until the next call: */
     plr_vision_report report;
@@ -242,7 +239,7 @@ plr_status plr_vision_forget(plr_vision *v);
  * PLR_E_NOT_READY no init; PLR_E_ARGUMENT a null pointer, a stride below the width, or pictures of another
  * size than the rig's: they are not those of its calibration; PLR_E_TIME not later than the last pair, or
  * halves more than a quarter second apart; PLR_E_NOT_FINITE, PLR_E_RANGE the expected motion is not finite,
- * no rotation, or more than 100 m. After an error nothing has changed. */
+ * no rotation, or more than 100 m, 1,000 m/s or 100 rad/s. After an error nothing has changed. */
 plr_status plr_vision_track(plr_vision *v, const plr_picture_pair *pair,
                             const plr_expected *expected, plr_frame *frame);
 

@@ -58,8 +58,22 @@ static void to_pose(plr_pose *to, plr_real R[9], const plr_real p[3]) {
         to->p[i] = (double)p[i];
 }
 
+/* The camera stands at -C^T t on the body: w_C = C w, v_C = C v - w_C x t. */
+static void tell_velocity(const plr_eyes_motion *m, const plr_real C[9], const plr_real t[3],
+                          bool place_known, plr_expected *e) {
+    plr_real v[3], w[3], lever[3];
+    plr_mat3_vec(v, C, m->v);
+    plr_mat3_vec(w, C, m->w);
+    plr_cross3(lever, w, t);
+    for (int i = 0; i < 3; i++) {
+        e->w_C_radps[i] = (double)w[i];
+        e->v_C_mps[i] = place_known ? (double)(v[i] - lever[i]) : 0.0;
+    }
+    e->velocity_known = true;
+}
+
 bool plr_eyes_motion_take(plr_eyes_motion *m, plr_time_ns t_ns, const plr_pose *T_CB,
-                          bool place_known, plr_pose *expected) {
+                          bool place_known, plr_expected *expected) {
     if (!m->known)
         return false;
     advance(m, t_ns, m->v, m->w);
@@ -75,7 +89,8 @@ bool plr_eyes_motion_take(plr_eyes_motion *m, plr_time_ns t_ns, const plr_pose *
     plr_mat3_vec(moved, CR, m->p);
     for (int i = 0; i < 3 && place_known; i++)
         p[i] = t[i] - Et[i] - moved[i];
-    to_pose(expected, E, p);
+    to_pose(&expected->motion, E, p);
+    tell_velocity(m, C, t, place_known, expected);
     begin(m, t_ns);
     return true;
 }

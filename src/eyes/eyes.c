@@ -177,7 +177,7 @@ static plr_status look(plr_eyes *e, const plr_picture_pair *pair, bool place_kno
     plr_eyes_motion moved = e->motion;
     memset(&e->expected, 0, sizeof e->expected);
     const bool known = plr_eyes_motion_take(&moved, step_time(e, pair->left.t_ns), &e->T_CB,
-                                            place_known, &e->expected.motion);
+                                            place_known, &e->expected);
     const plr_status status =
         plr_vision_track(&e->vision, pair, known ? &e->expected : NULL, frame);
     e->totals.refused += status != PLR_OK;

@@ -15,6 +15,7 @@
 #include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
+#include "state/motion.h"
 #include "state/pose.h"
 #include "state/sightings.h"
 
@@ -295,19 +296,22 @@ static plr_status correct_by_batch(plr_filter *f, plr_sensed *sensed, unsigned a
     return PLR_OK;
 }
 
-/* True if the correction is finite and small enough for a retraction. */
-static bool is_applicable(const plr_filter *f, unsigned n) {
+/* True if the correction, of the pose by xi, is finite and small enough for a retraction. */
+static bool is_applicable(const plr_filter *f, unsigned n, const plr_real xi[PLR_POSE_DIM]) {
     for (unsigned i = 0; i < n; i++)
         if (!plr_is_finite(f->work.dx[i]))
             return false;
-    return plr_pose_is_correction(f->work.dx);
+    return plr_pose_is_correction(xi);
 }
 
 /* Corrects the estimate by work.dx, and P with it. *cut: as in plr_correction. */
 static plr_status move_estimate(plr_filter *f, unsigned n, unsigned *cut) {
     PLR_ASSERT(n == plr_covariance_dim(&f->belief));
+    plr_real A[PLR_POSE_SQUARE], xi[PLR_POSE_DIM]; /* of the pose after the held motion */
     *cut = 0;
-    if (!is_applicable(f, n))
+    plr_motion_held_adjoint(&f->belief, A);
+    plr_mat6_vec(xi, A, f->work.dx);
+    if (!is_applicable(f, n, xi))
         return plr_filter_diverge(f);
     if (plr_has_block(&f->belief, PLR_BLOCK_BIAS))
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
@@ -317,7 +321,7 @@ static plr_status move_estimate(plr_filter *f, unsigned n, unsigned *cut) {
             f->belief.velocity[i] += f->work.dx[plr_row_of(&f->belief, PLR_BLOCK_VELOCITY) + i];
     plr_velocity_forget_bias(&f->source);
     *cut = plr_model_of(&f->belief)->retract(&f->belief, &f->camera, &f->work, f->work.dx);
-    plr_pose_correct(&f->belief, f->work.dx);
+    plr_pose_correct(&f->belief, xi);
     plr_covariance_make_up_for_rounding(&f->belief);
     return plr_covariance_is_positive(&f->belief) ? PLR_OK : plr_filter_diverge(f);
 }

@@ -59,6 +59,7 @@ static uint64_t large_sum(const plr_filter *f) {
     for (unsigned k = 0; k < f->camera.errors.count; k++)
         plr_checksum_add(&sum, f->belief.S[k],
                          plr_covariance_dim(&f->belief) * sizeof *f->belief.S[k]);
+    plr_checksum_add(&sum, &f->belief.held, sizeof f->belief.held);
     return plr_checksum_mixed(&sum);
 }
 

@@ -202,6 +202,15 @@ static void widen(const plr_reading *reading, plr_real times, plr_real more, plr
             R[i] = PLR_FMA(times, R[i], more);
 }
 
+/* H by the present pose becomes that by the pose in P, which stands before the motion that is held. */
+static void by_pose_before_motion(const plr_belief *belief, plr_term *H) {
+    plr_real A[PLR_POSE_SQUARE], HA[PLR_ROWS * PLR_POSE_DIM] = {0};
+    plr_motion_held_adjoint(belief, A);
+    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, H->H, PLR_POSE_DIM, A, PLR_POSE_DIM, HA,
+                PLR_POSE_DIM);
+    memcpy(H->H, HA, sizeof HA);
+}
+
 /* Gates a reading of the state by the pose's present covariance, and applies it. A rejected one
  * changes nothing. */
 static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
@@ -232,7 +241,9 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     if (!passes(f, d2) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
     plr_filter_note_motion(f);
-    return correct(f, plr_predict_apply_pending(f), &m, 1);
+    const plr_status status = plr_predict_apply_pending(f);
+    by_pose_before_motion(&f->belief, &m.H.term[0]);
+    return correct(f, status, &m, 1);
 }
 
 static void count(plr_filter *f, const plr_reading_result *result) {

@@ -90,6 +90,7 @@ plr_picture_decision plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_P
     f->totals.widened++;
     f->frames_off_the_map = 0;
     f->work.noise.open = 0;
+    memset(&f->belief.held, 0, sizeof f->belief.held);
     plr_motion_clear(&f->belief, &f->motion);
     plr_covariance_begin(&f->belief, PLR_BLOCK_POSE, P_xi);
     plr_filter_begin_velocity(f);

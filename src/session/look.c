@@ -21,10 +21,6 @@ enum {
 /* Halves that differ by more than this, s, and by five sigma. */
 #define APART_S 2e-3F
 
-/* Of an IMU's velocity, m/s: in a pair's time a body changes its own by as much, and then a track's last
- * drift tells as well where it will be. */
-#define PLACE_SIGMA 0.1
-
 static void tell(plr_session *s, uint32_t bit, const char *words) {
     if (s->options.eyes->told & bit)
         return;
@@ -107,7 +103,7 @@ static bool place_is_known(const plr_session *s) {
     if (plr_filter_velocity_covariance(&s->filter, P) != PLR_OK)
         return false;
     for (unsigned i = 0; i < 3; i++)
-        if (!(P[7 * i] < PLACE_SIGMA * PLACE_SIGMA))
+        if (!(P[7 * i] < PLR_EYES_SPEED_SIGMA * PLR_EYES_SPEED_SIGMA))
             return false;
     return true;
 }

@@ -71,7 +71,8 @@ bool plr_covariance_is_positive(const plr_belief *belief);
 
 /* --- motion --- */
 
-/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. F may
+/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back; the sensitivity of the
+ * landmarks is the caller's. F may
  * stand at the beginning of work.Vt; the next 21 numbers a landmark there are used. */
 void plr_covariance_transport(plr_belief *belief, plr_real *Vt, const plr_real A[PLR_POSE_SQUARE],
                               const plr_real *F);
@@ -83,7 +84,8 @@ void plr_covariance_turn_pose(plr_belief *belief, const plr_real A[PLR_POSE_SQUA
  * C = P_(:,d) B^T, d the drivers, and nu = L^-1 n,
  *   P -= (C L^-T) (C L^-T)^T,  W += C L^-T,  Lambda = I,  eta = -z,  dx = C L^-T z,
  * so that the state is x + W (nu - z) with x and nu independent. Before the call W^T (6 x dim,
- * leading dimension plr_covariance_ld) must hold the motion's direct effect. */
+ * leading dimension plr_covariance_ld) must hold the motion's direct effect on the state before it, which P is of
+ * but for velocity and biases: they are carried on. */
 void plr_covariance_open_noise(plr_belief *belief, const plr_motion *motion, plr_workspace *work,
                                const plr_applied_motion *applied);
 

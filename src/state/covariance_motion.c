@@ -118,7 +118,6 @@ void plr_covariance_transport(plr_belief *belief, plr_real *Vt, const plr_real A
         plr_blocks3_widen(belief->count, F, by.Gt);
     for (unsigned slot = 0; slot < belief->count; slot++)
         transport_landmark(belief, slot, At, &by);
-    plr_sensitivity_turn_landmarks(belief, F);
 }
 
 void plr_covariance_motion_share(const plr_belief *belief, unsigned row,
@@ -139,26 +138,12 @@ void plr_covariance_motion_share(const plr_belief *belief, unsigned row,
     three_rows_by_six(drivers, X, Kt, out);
 }
 
-/* X, rows x drivers, PLR_DRIVERS apart, a derivative by the drivers before a motion (I + E, p),
- * becomes that by the drivers after the pose's transport: theta is turned. */
-static void drivers_after_motion(const plr_belief *belief, const plr_real E[9], unsigned rows,
-                                 plr_real *X) {
-    if (belief->layout.driver >= PLR_POSE_DIM)
-        return;
-    for (unsigned r = 0; r < rows; r++, X += PLR_DRIVERS) {
-        plr_real turned[3];
-        plr_mat3_tvec(turned, E, X);
-        for (unsigned c = 0; c < 3; c++)
-            X[c] += turned[c];
-    }
-}
-
-/* After the motion: v <- V x_d + noise, b <- b + noise, V by the drivers as they stand in P. */
-static void carry_core_covariance(plr_belief *belief, const plr_motion *motion,
-                                  const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS]) {
+/* After the motion: v <- V x_d + noise, b <- b + noise. */
+static void carry_core_covariance(plr_belief *belief, const plr_motion *motion) {
     PLR_ASSERT(plr_has_block(belief, PLR_BLOCK_VELOCITY) && plr_has_block(belief, PLR_BLOCK_BIAS));
     enum { D = PLR_DRIVERS, C = PLR_VELOCITY_DIM };
     const plr_core_motion *m = &motion->core;
+    const plr_real *V = m->V;
     const unsigned n = plr_covariance_dim(belief), first = belief->layout.driver;
     const unsigned velocity = plr_row_of(belief, PLR_BLOCK_VELOCITY);
     plr_real P_xd[PLR_CORE_DIM * D], VP[C * PLR_CORE_DIM] = {0}, P_vv[C * C] = {0};
@@ -185,22 +170,22 @@ static void carry_core_covariance(plr_belief *belief, const plr_motion *motion,
 void plr_covariance_carry_core(plr_belief *belief, const plr_motion *motion) {
     if (!plr_has_block(belief, PLR_BLOCK_VELOCITY))
         return;
-    carry_core_covariance(belief, motion, motion->core.V);
+    carry_core_covariance(belief, motion);
     plr_sensitivity_carry_velocity(belief, motion->core.V);
 }
 
 /* The same but for S; and in Vt of velocity and biases, whose noise goes with the motion's. */
 static void carry_core(plr_belief *belief, const plr_motion *motion,
-                       const plr_applied_motion *applied,
-                       const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], plr_real *Vt, size_t ld) {
+                       const plr_applied_motion *applied, plr_real *Vt, size_t ld) {
     const unsigned first = belief->layout.driver, velocity = plr_row_of(belief, PLR_BLOCK_VELOCITY);
     plr_real X[PLR_POSE_DIM * PLR_REST_DIM];
-    carry_core_covariance(belief, motion, V);
+    carry_core_covariance(belief, motion);
     memcpy(X, motion->core.Q_nc, sizeof X);
     plr_motion_solve(applied->L, PLR_REST_DIM, X, PLR_REST_DIM);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real *row = Vt + k * ld, v[PLR_VELOCITY_DIM] = {0};
-        plr_gemm_nn(PLR_VELOCITY_DIM, 1, PLR_DRIVERS, V, PLR_DRIVERS, row + first, 1, v, 1);
+        plr_gemm_nn(PLR_VELOCITY_DIM, 1, PLR_DRIVERS, motion->core.V, PLR_DRIVERS, row + first, 1,
+                    v, 1);
         memcpy(row + velocity, v, sizeof v);
         for (unsigned c = 0; c < PLR_REST_DIM; c++)
             row[velocity + c] += X[PLR_REST_DIM * k + c];
@@ -233,17 +218,12 @@ void plr_covariance_open_noise(plr_belief *belief, const plr_motion *motion, plr
     if (belief->layout.drivers == 0)
         return;
     const bool carries = plr_has_block(belief, PLR_BLOCK_VELOCITY);
-    plr_real *Vt = work->Vt, K[PLR_MOTION_BY], Kt[PLR_MOTION_BY], V[PLR_VELOCITY_DIM * PLR_DRIVERS];
+    plr_real *Vt = work->Vt, K[PLR_MOTION_BY], Kt[PLR_MOTION_BY];
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         memset(Vt + k * ld + n, 0, (ld - n) * sizeof *Vt);
     plr_motion_by_drivers(belief, motion, applied->L, K);
-    drivers_after_motion(belief, applied->E, PLR_POSE_DIM, K);
     plr_motion_transpose(K, Kt);
-    if (carries) {
-        memcpy(V, motion->core.V, sizeof V);
-        drivers_after_motion(belief, applied->E, PLR_VELOCITY_DIM, V);
-    }
-    plr_sensitivity_move(belief, K, carries ? V : NULL, noise->Wt, ld);
+    plr_sensitivity_move(belief, K, carries ? motion->core.V : NULL, noise->Wt, ld);
     for (unsigned i = 0; i < n; i += PLR_ROWS) {
         plr_real v[PLR_ROWS * PLR_POSE_DIM];
         plr_covariance_motion_share(belief, i, Kt, v);
@@ -252,7 +232,7 @@ void plr_covariance_open_noise(plr_belief *belief, const plr_motion *motion, plr
                 Vt[k * ld + i + r] = v[PLR_POSE_DIM * r + k];
     }
     if (carries)
-        carry_core(belief, motion, applied, V, Vt, ld);
+        carry_core(belief, motion, applied, Vt, ld);
     for (unsigned i = 0; i < n; i++)
         for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
             const plr_real v = Vt[k * ld + i];

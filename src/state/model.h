@@ -39,12 +39,13 @@ typedef struct plr_world_point {
 } plr_world_point;
 
 struct plr_model {
-    /* Applies a motion to landmarks and covariance; T_WB has been moved before. `body` keeps the
-     * motion's noise apart in work.noise (docs/MATH.md 10); `world` adds it to P. */
+    /* Applies a motion; T_WB has been moved before. `body` holds it (plr_held_motion) until `retract` moves
+     * landmarks and P, at once where it is exact, and keeps its noise apart in work.noise (docs/MATH.md 10);
+     * `world` moves P, and adds the noise to it. */
     void (*propagate)(plr_belief *belief, const plr_camera_model *camera, const plr_motion *motion,
                       plr_workspace *work, const plr_applied_motion *applied);
 
-    /* The landmark in the camera. False nearer than min_depth, where no linearisation is valid. */
+    /* The landmark in the camera, after the held motion. False nearer than min_depth, where no linearisation is valid. */
     bool (*look)(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                  plr_view *view);
 
@@ -69,7 +70,7 @@ struct plr_model {
      * same patch, so the point stays as deep as it is. NULL in `world`. */
     void (*drift)(plr_belief *belief, const plr_camera_model *camera, plr_real sigma);
 
-    /* Applies a correction dx of the whole state to the landmarks, and transports P there; pose and
+    /* Moves landmarks and P along the held motion and by a correction dx of the whole state before it; pose and
      * bias are the caller's. Returns how many were limited: PLR_REASON_RANGE_LIMITED. */
     unsigned (*retract)(plr_belief *belief, const plr_camera_model *camera, plr_workspace *work,
                         const plr_real *dx);

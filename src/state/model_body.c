@@ -88,7 +88,8 @@ static void enforce_min_range(plr_real q[3]) {
         q[2] = PLR_MIN_RANGE;
 }
 
-/* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
+/* W^T, 6 x dim, where the motion's noise is JL before it: rows JL of the pose, G JL of the landmarks,
+ * G = Jw(q) [-I | [q]x] Ad(T_CB). */
 static void fill_W(const plr_belief *belief, const plr_camera_model *camera,
                    const plr_real JL[PLR_POSE_SQUARE], plr_real *Wt, size_t ld) {
     const unsigned n = plr_covariance_dim(belief), first = plr_covariance_row(belief, 0);
@@ -135,23 +136,29 @@ static bool body_look(const plr_belief *belief, const plr_camera_model *camera, 
                       plr_view *view) {
     PLR_ASSERT(slot < belief->count);
     memcpy(view->q, belief->slots[slot].x, sizeof view->q);
+    plr_se3_move_back(view->q, belief->held.E_C, belief->held.p_C);
     return view->q[2] >= camera->min_depth;
 }
 
-/* H = Dz Ji(q), Ji = [r N | -r q]. */
+/* H = Dz R^T Ji(q) with Ji = [r N | -r q], q being where the landmark stands and R^T (q - p) where the held motion
+ * takes it: along q the pixels change by Dz R^T q = Dz R^T (q - p) + Dz R^T p. */
 static void body_derive(const plr_belief *belief, const plr_camera_model *camera, unsigned slot,
                         const plr_view *view, const plr_real Dz[9], const plr_real along[3],
                         plr_real z[3], plr_rows *H) {
     PLR_ASSERT(slot < belief->count);
     (void)camera;
+    const plr_held_motion *held = &belief->held;
     plr_polar chart;
-    plr_polar_at(&chart, view->q);
+    plr_real R[9], DzRt[9];
+    plr_polar_at(&chart, belief->slots[slot].x);
+    plr_se3_rotation(R, held->E_C);
+    plr_mat3_mul_nt(DzRt, Dz, R);
     H->terms = 0;
     plr_real *h = plr_rows_add(H, plr_covariance_row(belief, slot), PLR_LANDMARK_DIM);
     for (int row = 0; row < 3; row++, h += 3) {
         for (int column = 0; column < 2; column++)
-            h[column] = chart.r * plr_dot3(Dz + 3 * row, chart.N[column]);
-        h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
+            h[column] = chart.r * plr_dot3(DzRt + 3 * row, chart.N[column]);
+        h[2] = -chart.r * (along[row] / view->q[2] + plr_dot3(DzRt + 3 * row, held->p_C));
         z[row] = PLR_FMA(h[2], belief->slots[slot].beyond, z[row]);
     }
 }
@@ -243,10 +250,11 @@ static unsigned sight_of(const plr_belief *belief, unsigned slot) {
  * from the pose's correction xi, which may mostly concern the way before, in which no visible
  * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
  * causes. Known landmarks are left out: they are fixed in the world, and the common part of a map's
- * errors is no motion. J becomes chart_by_body_twist of every slot. */
+ * errors is no motion. w: the landmarks' corrections, one after the other. J becomes chart_by_body_twist of
+ * every slot. */
 static void find_common_motions(const plr_belief *belief, const plr_camera_model *camera,
-                                const plr_noise *noise, const plr_real *dx, plr_real *J,
-                                plr_common_motion common[SIGHTS]) {
+                                const plr_noise *noise, const plr_real xi[PLR_POSE_DIM],
+                                const plr_real *w, plr_real *J, plr_common_motion common[SIGHTS]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
     const bool parted = plr_has_block(belief, PLR_BLOCK_VELOCITY);
     const plr_real baseline = camera->given.baseline;
@@ -259,13 +267,12 @@ static void find_common_motions(const plr_belief *belief, const plr_camera_model
         plr_polar_at(&chart, belief->slots[slot].x);
         chart_by_body_twist(camera, &chart, J);
         if (!belief->slots[slot].known)
-            plr_rigid_fit_add(&fit[sight_of(belief, slot)], J,
-                              dx + plr_covariance_row(belief, slot), W);
+            plr_rigid_fit_add(&fit[sight_of(belief, slot)], J, w + PLR_LANDMARK_DIM * slot, W);
     }
     for (unsigned sight = 0; sight < (parted ? SIGHTS : 1); sight++) {
         plr_common_motion *m = &common[sight];
         plr_real eta_C[PLR_POSE_DIM];
-        plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : dx,
+        plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : xi,
                             noise->motion_variance, angle2, m->eta);
         plr_mat6_vec(eta_C, camera->Ad_CB, m->eta);
         plr_se3_expm1(m->E, m->p, eta_C);
@@ -282,30 +289,73 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
     w[1] = PLR_FMA(F[4], w1, F[3] * w0);
 }
 
+/* Moves the landmarks and their sensitivity along the held motion, without P. F: the derivative of each; w: its
+ * correction there. What the estimate is beyond the point goes along as an error does. */
+static void move_along(plr_belief *belief, const plr_real *dx, plr_real *F, plr_real *w) {
+    const plr_held_motion *held = &belief->held;
+    plr_real R[9];
+    plr_se3_rotation(R, held->E_C);
+    for (unsigned slot = 0; slot < belief->count; slot++, F += 9, w += PLR_LANDMARK_DIM) {
+        plr_slot *s = &belief->slots[slot];
+        const plr_real beyond = s->beyond, *before = dx + plr_covariance_row(belief, slot);
+        plr_polar from, to;
+        if (!held->any) {
+            plr_mat3_identity(F);
+            memcpy(w, before, PLR_LANDMARK_DIM * sizeof *w);
+            continue;
+        }
+        plr_polar_at(&from, s->x);
+        plr_se3_move_back(s->x, held->E_C, held->p_C);
+        enforce_min_range(s->x);
+        plr_polar_at(&to, s->x);
+        chart_jacobian(F, &to, R, held->p_C, &from);
+        plr_sensitivity_turn_landmark(belief, slot, F);
+        plr_mat3_vec(w, F, before);
+        w[0] = PLR_FMA(F[2], beyond, w[0]);
+        w[1] = PLR_FMA(F[5], beyond, w[1]);
+        s->beyond = F[8] * beyond;
+    }
+}
+
+/* F <- diag(M, 1) F, 3x3 */
+static void turn_chart(plr_real F[9], const plr_real M[4]) {
+    for (int k = 0; k < 3; k++) {
+        const plr_real f[2] = {F[k], F[3 + k]};
+        F[k] = PLR_FMA(M[1], f[1], M[0] * f[0]);
+        F[3 + k] = PLR_FMA(M[3], f[1], M[2] * f[0]);
+    }
+}
+
 /*
- * Applies the common part of the landmarks' corrections as a rigid motion eta, exactly, and the
- * rest of each through its chart, at the point to which that motion has brought the landmark:
+ * Moves landmarks and P, once, along the motion that is held and by the correction. At the end of the motion the common
+ * part of the landmarks' corrections is applied as a rigid motion eta, exactly, and the
+ * rest of each through its chart, at the point to which eta has brought the landmark:
  *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = Exp(eta_C)^-1 q,  q+ = retr(q~, w_rest).
- * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q), where theta_C is the rotation of
- * eta_C, and the pose's rows by Ad(Exp(-xi)).
+ * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q) F, where theta_C is the rotation of
+ * eta_C and F the derivative of the held motion, and the pose's rows by Ad(Exp(-xi)) A.
  */
 static unsigned body_retract(plr_belief *belief, const plr_camera_model *camera,
                              plr_workspace *work, const plr_real *dx) {
-    plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE];
+    plr_real R_xi[9], p_xi[3], xi[PLR_POSE_DIM], A[PLR_POSE_SQUARE], by_xi[PLR_POSE_SQUARE],
+        by_both[PLR_POSE_SQUARE];
     plr_common_motion both[SIGHTS];
-    plr_se3_exp(R_xi, p_xi, dx);
-    plr_se3_adjoint_inverse(A, R_xi, p_xi);
-    plr_real *F = work->Vt, *J = F + 9 * belief->count; /* 27 numbers a slot; Vt has at least 72 */
-    find_common_motions(belief, camera, &work->noise, dx, J, both);
+    plr_motion_held_adjoint(belief, A);
+    plr_mat6_vec(xi, A, dx);
+    plr_se3_exp(R_xi, p_xi, xi);
+    plr_se3_adjoint_inverse(by_xi, R_xi, p_xi);
+    plr_mat6_mul(by_both, by_xi, A);
+    plr_real *F = work->Vt, *J = F + 9 * belief->count; /* 30 numbers a slot; Vt has at least 72 */
+    plr_real *w = J + PLR_ROWS * PLR_POSE_DIM * belief->count;
+    move_along(belief, dx, F, w);
+    find_common_motions(belief, camera, &work->noise, xi, w, J, both);
 
     unsigned cut = 0;
-    for (unsigned slot = 0; slot < belief->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
+    for (unsigned slot = 0; slot < belief->count; slot++) {
         const plr_common_motion *common = &both[sight_of(belief, slot)];
         plr_slot *s = &belief->slots[slot];
         plr_polar from, there, to;
-        plr_real M[4], w[3], rigid[9];
+        plr_real M[4], rigid[9], along[9];
         plr_polar_at(&from, s->x);
-        memcpy(w, dx + plr_covariance_row(belief, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < PLR_POSE_DIM; k++)
                 w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], common->eta[k], w[i]);
@@ -316,54 +366,42 @@ static unsigned body_retract(plr_belief *belief, const plr_camera_model *camera,
         turn_rest(w, rigid, &there, &from);
         cut += plr_polar_retract(&to, M, &there, w, camera->min_inverse_range, s->x, &s->beyond);
         plr_sensitivity_move_range(belief, camera, slot, there.r / to.r);
-        plr_real *own = F + 9 * slot;
-        for (int k = 0; k < 3; k++) {
-            own[k] = PLR_FMA(M[1], rigid[3 + k], M[0] * rigid[k]);
-            own[3 + k] = PLR_FMA(M[3], rigid[3 + k], M[2] * rigid[k]);
-            own[6 + k] = rigid[6 + k];
-        }
+        turn_chart(rigid, M);
+        plr_sensitivity_turn_landmark(belief, slot, rigid);
+        memcpy(along, F + 9 * slot, sizeof along);
+        plr_mat3_mul(F + 9 * slot, rigid, along);
+        J += PLR_ROWS * PLR_POSE_DIM;
+        w += PLR_LANDMARK_DIM;
     }
-    plr_covariance_transport(belief, work->Vt, A, F);
+    memset(&belief->held, 0, sizeof belief->held);
+    plr_covariance_transport(belief, work->Vt, by_both, F);
     return cut;
 }
 
+/* The landmarks and P stay where they are: the retraction moves them. */
 static void body_propagate(plr_belief *belief, const plr_camera_model *camera,
                            const plr_motion *motion, plr_workspace *work,
                            const plr_applied_motion *applied) {
-    plr_real E[9], R[9], p[3];
-    plr_camera_motion(E, p, &camera->given, applied->E, applied->p);
-    plr_se3_rotation(R, E);
-
-    plr_real *F = work->Vt, largest_offset = 0;
-    memset(work->dx, 0, plr_covariance_row(belief, 0) * sizeof *work->dx);
-    for (unsigned slot = 0; slot < belief->count; slot++) {
-        plr_slot *s = &belief->slots[slot];
-        plr_polar from, to;
-        const plr_real offset = move_to_linearisation_point(belief, camera, &work->noise, slot);
-        largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
-        plr_polar_at(&from, s->x);
-        plr_se3_move_back(s->x, E, p);
-        enforce_min_range(s->x);
-        plr_polar_at(&to, s->x);
-        chart_jacobian(F + 9 * slot, &to, R, p, &from);
-        plr_real *dx = work->dx + plr_covariance_row(belief, slot);
-        dx[0] = offset * F[9 * slot + 2];
-        dx[1] = offset * F[9 * slot + 5];
-        dx[2] = 0;
-        s->beyond = offset * F[9 * slot + 8];
-    }
-    plr_real A[PLR_POSE_SQUARE];
+    plr_held_motion *held = &belief->held;
+    plr_real R[9], Ad[PLR_POSE_SQUARE], JL[PLR_POSE_SQUARE];
+    memcpy(held->E, applied->E, sizeof held->E);
+    memcpy(held->p, applied->p, sizeof held->p);
+    plr_camera_motion(held->E_C, held->p_C, &camera->given, held->E, held->p);
+    held->any = 1;
+    plr_se3_rotation(R, held->E);
+    plr_se3_adjoint(Ad, R, held->p);
+    plr_mat6_mul(JL, Ad, applied->JL);          /* D' Exp(JL nu) = Exp(Ad(D') JL nu) D' */
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* the prior of the common motions */
         work->noise.motion_variance[k] = plr_norm2_of_6(applied->JL + PLR_POSE_DIM * k);
-    plr_se3_rotation(R, applied->E);
-    plr_se3_adjoint_inverse(A, R, applied->p);
-    plr_covariance_transport(belief, work->Vt, A, F);
-    if (!motion->noisy) { /* no correction follows to which dx could be added */
-        if (largest_offset > 0)
-            (void)body_retract(belief, camera, work, work->dx);
+    memset(work->dx, 0, plr_covariance_dim(belief) * sizeof *work->dx);
+    for (unsigned slot = 0; slot < belief->count; slot++)
+        belief->slots[slot].beyond =
+            move_to_linearisation_point(belief, camera, &work->noise, slot);
+    if (!motion->noisy) { /* nothing is to be told apart from P */
+        (void)body_retract(belief, camera, work, work->dx);
         return;
     }
-    fill_W(belief, camera, applied->JL, work->noise.Wt, plr_covariance_ld(belief));
+    fill_W(belief, camera, JL, work->noise.Wt, plr_covariance_ld(belief));
     plr_covariance_open_noise(belief, motion, work, applied);
 }
 

@@ -160,6 +160,12 @@ void plr_motion_at(const plr_motion *motion, const plr_applied_motion *prior,
     plr_mat6_mul(applied->JL, Jr, applied->L);
 }
 
+void plr_motion_held_adjoint(const plr_belief *belief, plr_real A[PLR_POSE_SQUARE]) {
+    plr_real R[9];
+    plr_se3_rotation(R, belief->held.E);
+    plr_se3_adjoint_inverse(A, R, belief->held.p);
+}
+
 void plr_motion_pose_covariance(const plr_belief *belief, const plr_motion *motion,
                                 plr_real P_xi[PLR_POSE_SQUARE]) {
     const unsigned drivers = belief->layout.drivers;

@@ -63,6 +63,9 @@ void plr_motion_widen_velocity(const plr_belief *belief, plr_motion *motion, plr
 void plr_motion_at(const plr_motion *motion, const plr_applied_motion *prior,
                    const plr_real z[PLR_POSE_DIM], plr_applied_motion *applied);
 
+/* A = Ad(D'^-1) of the motion D' that is held (plr_held_motion): xi after it is A xi before it. */
+void plr_motion_held_adjoint(const plr_belief *belief, plr_real A[PLR_POSE_SQUARE]);
+
 /* The pose's covariance, 6x6, as if the accumulated motion were applied. */
 void plr_motion_pose_covariance(const plr_belief *belief, const plr_motion *motion,
                                 plr_real P_xi[PLR_POSE_SQUARE]);

@@ -45,13 +45,12 @@ void plr_sensitivity_turn_pose(plr_belief *belief, const plr_real A[PLR_POSE_SQU
     }
 }
 
-void plr_sensitivity_turn_landmarks(plr_belief *belief, const plr_real *F) {
+void plr_sensitivity_turn_landmark(plr_belief *belief, unsigned slot, const plr_real F[9]) {
+    PLR_ASSERT(slot < belief->count);
     for (unsigned k = 0; k < belief->layout.errors; k++) {
-        plr_real *S = belief->S[k] + plr_covariance_row(belief, 0), turned[PLR_LANDMARK_DIM];
-        for (unsigned slot = 0; slot < belief->count; slot++, S += PLR_LANDMARK_DIM) {
-            plr_mat3_vec(turned, F + 9 * slot, S);
-            memcpy(S, turned, sizeof turned);
-        }
+        plr_real *S = belief->S[k] + plr_covariance_row(belief, slot), turned[PLR_LANDMARK_DIM];
+        plr_mat3_vec(turned, F, S);
+        memcpy(S, turned, sizeof turned);
     }
 }
 

@@ -36,8 +36,8 @@ void plr_sensitivity_remove(plr_belief *belief, unsigned to, unsigned from);
 /* S_xi <- A S_xi, 6x6. */
 void plr_sensitivity_turn_pose(plr_belief *belief, const plr_real A[PLR_POSE_SQUARE]);
 
-/* The rows of each landmark <- F (3x3, one after the other) times them. */
-void plr_sensitivity_turn_landmarks(plr_belief *belief, const plr_real *F);
+/* The rows of a landmark <- F (3x3) times them. */
+void plr_sensitivity_turn_landmark(plr_belief *belief, unsigned slot, const plr_real F[9]);
 
 /* A landmark is linearised elsewhere on its ray, where its inverse range is `ratio` times what it was:
  * so is its derivative by those errors that are estimated; by a shift of the camera the square of it. Of

@@ -9,6 +9,8 @@ enum { SIDE_MIN = 48, SIDE_MAX = 4096 };
 #define ROW_TIME_MAX_S 1e-3
 #define FAR            1e6 /* px and m of a calibration */
 #define MOTION_MAX_M   100.0
+#define SPEED_MAX_MPS  1e3
+#define RATE_MAX_RADPS 100.0
 #define ORTHONORMAL    1e-3
 
 static bool is_rotation(const double R[9]) {
@@ -77,9 +79,13 @@ plr_status plr_check_expected(const plr_expected *e) {
         return PLR_OK;
     if (e->depth_count > 0 && !e->depths)
         return PLR_E_ARGUMENT;
-    if (!plr_all_finite(e->motion.R, 9) || !plr_all_finite(e->motion.p, 3))
+    const bool moves = e->velocity_known;
+    if (!plr_all_finite(e->motion.R, 9) || !plr_all_finite(e->motion.p, 3) ||
+        (moves && !(plr_all_finite(e->v_C_mps, 3) && plr_all_finite(e->w_C_radps, 3))))
         return PLR_E_NOT_FINITE;
-    if (!is_rotation(e->motion.R) || !plr_all_within(e->motion.p, 3, MOTION_MAX_M))
+    if (!is_rotation(e->motion.R) || !plr_all_within(e->motion.p, 3, MOTION_MAX_M) ||
+        (moves && !(plr_all_within(e->v_C_mps, 3, SPEED_MAX_MPS) &&
+                    plr_all_within(e->w_C_radps, 3, RATE_MAX_RADPS))))
         return PLR_E_RANGE;
     return PLR_OK;
 }

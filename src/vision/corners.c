@@ -96,7 +96,7 @@ static bool best_corner(const plr_image *image, const window *w, plr_corner *cor
         if (where >= 0)
             u = first + 2 * where + BOX - 1, v = y - BOX + 1;
     }
-    corner->score = (float)best;
+    corner->score = best;
     corner->u = (uint16_t)(u < 0 ? 0 : u), corner->v = (uint16_t)(v < 0 ? 0 : v);
     return u >= 0;
 }
@@ -116,8 +116,8 @@ static bool window_of(window *w, const plr_cells *c, unsigned cell, const plr_im
     return w->u + 1 < w->u_end && w->v < w->v_end;
 }
 
-static void mark_taken(const plr_vision *v, const plr_cells *c, uint8_t taken[PLR_VISION_CELLS]) {
-    memset(taken, 0, PLR_VISION_CELLS);
+static void mark_taken(const plr_vision *v, const plr_cells *c, uint8_t taken[PLR_CELLS]) {
+    memset(taken, 0, PLR_CELLS);
     for (unsigned i = 0; i < v->track_count; i++) {
         const plr_real *at = v->tracks[i].at;
         const unsigned across = (unsigned)(at[0] > 0 ? at[0] : 0) / c->side_px;
@@ -127,34 +127,34 @@ static void mark_taken(const plr_vision *v, const plr_cells *c, uint8_t taken[PL
     }
 }
 
-/* Equal scores keep the order of their cells. */
-static void strongest_first(plr_corner *c, unsigned n) {
-    for (unsigned i = 1; i < n; i++) {
-        const plr_corner moving = c[i];
-        unsigned j = i;
-        for (; j > 0 && c[j - 1].score < moving.score; j--)
-            c[j] = c[j - 1];
-        c[j] = moving;
-    }
+/* Puts a corner behind those that are as strong; returns how many there are now. */
+static unsigned insert(plr_corner sorted[PLR_CORNERS], unsigned n, const plr_corner *corner) {
+    unsigned i = n;
+    for (; i > 0 && sorted[i - 1].score < corner->score; i--)
+        if (i < PLR_CORNERS)
+            sorted[i] = sorted[i - 1];
+    if (i < PLR_CORNERS)
+        sorted[i] = *corner;
+    return n < PLR_CORNERS ? n + 1 : n;
 }
 
-void plr_corners_find(plr_vision *v, const plr_levels *left) {
-    uint8_t taken[PLR_VISION_CELLS];
+unsigned plr_corners_find(const plr_vision *v, const plr_levels *left,
+                          plr_corner corners[PLR_CORNERS]) {
+    uint8_t taken[PLR_CELLS];
     const plr_cells c = plr_cells_of(v->width, v->height);
-    unsigned level = 0;
+    unsigned level = 0, n = 0;
     while (level + 1 < left->count && left->level[level].width > WIDEST)
         level++;
     mark_taken(v, &c, taken);
-    v->corner_count = 0;
     for (unsigned cell = 0; cell < (unsigned)c.across * c.down; cell++) {
         window w;
-        plr_corner *corner = &v->corners[v->corner_count];
+        plr_corner corner;
         if (taken[cell] || !window_of(&w, &c, cell, &left->level[level], level) ||
-            !best_corner(&left->level[level], &w, corner))
+            !best_corner(&left->level[level], &w, &corner))
             continue;
-        corner->u = (uint16_t)((corner->u << level) + (1 << level) / 2);
-        corner->v = (uint16_t)((corner->v << level) + (1 << level) / 2);
-        v->corner_count++;
+        corner.u = (uint16_t)((corner.u << level) + (1 << level) / 2);
+        corner.v = (uint16_t)((corner.v << level) + (1 << level) / 2);
+        n = insert(corners, n, &corner);
     }
-    strongest_first(v->corners, v->corner_count);
+    return n;
 }

@@ -30,26 +30,30 @@ enum { SLOPE_FITS = 3 }; /* of a birth */
 /* Coarse levels may lead astray: at <- the place from which it began, where that is likelier. */
 static void choose(plr_real at[2], const plr_real begun[2], const plr_image *image, unsigned level,
                    const plr_template *t, const plr_real A[4]) {
+    if (at[0] == begun[0] && at[1] == begun[1])
+        return;
     const plr_real led[2] = {plr_pyramid_down(at[0], level), plr_pyramid_down(at[1], level)};
     const plr_real own[2] = {plr_pyramid_down(begun[0], level), plr_pyramid_down(begun[1], level)};
     if (plr_patch_likeness(image, t, own, A) > plr_patch_likeness(image, t, led, A))
         at[0] = begun[0], at[1] = begun[1];
 }
 
-/* Finds `patch` of so many levels near `at` (px of level 0, in and out), from the level `from` on. */
+/* Finds `patch` of so many levels near `at` (px of level 0, in and out), from the level `from` on. `t` becomes
+ * the finest one's. */
 static bool find(plr_vision *v, const plr_levels *in, const uint8_t (*patch)[PLR_PATCH_BYTES],
-                 unsigned from, const plr_real A[4], plr_real at[2], plr_fit *fit) {
-    plr_template t;
+                 unsigned from, const plr_real A[4], plr_real at[2], plr_template *t,
+                 plr_fit *fit) {
     const plr_real begun[2] = {at[0], at[1]};
     plr_real start[2] = {at[0], at[1]};
     memset(fit, 0, sizeof *fit);
     for (unsigned level = from + 1; level-- > 0;) {
-        if (!plr_template_make(&t, patch[level]))
+        fit->likeness = 0;
+        if (!plr_template_make(t, patch[level]))
             continue;
-        choose(at, begun, &in->level[level], level, &t, A);
+        choose(at, begun, &in->level[level], level, t, A);
         start[0] = at[0], start[1] = at[1];
         fit->at[0] = plr_pyramid_down(at[0], level), fit->at[1] = plr_pyramid_down(at[1], level);
-        plr_patch_fit(fit, &in->level[level], &t, A, level > 0 ? STEPS_COARSE : STEPS_FINEST);
+        plr_patch_fit(fit, &in->level[level], t, A, level > 0 ? STEPS_COARSE : STEPS_FINEST);
         v->report.steps = (uint16_t)(v->report.steps + fit->steps);
         if (fit->inside && (level == 0 || fit->likeness > LIKE_COARSE)) {
             at[0] = plr_pyramid_up(fit->at[0], level);
@@ -61,11 +65,11 @@ static bool find(plr_vision *v, const plr_levels *in, const uint8_t (*patch)[PLR
     return fit->inside && fit->ended && fit->likeness > LIKE;
 }
 
-/* A patch of each level around a place; returns how many levels have one. */
-static unsigned cut(const plr_levels *from, const plr_real at[2],
+/* A patch of each of so many levels around a place; returns how many have one. */
+static unsigned cut(const plr_levels *from, const plr_real at[2], unsigned most,
                     uint8_t (*patch)[PLR_PATCH_BYTES]) {
     unsigned level = 0;
-    for (; level < from->count; level++) {
+    for (; level < most; level++) {
         const plr_real here[2] = {plr_pyramid_down(at[0], level), plr_pyramid_down(at[1], level)};
         if (!plr_patch_cut(&from->level[level], here, patch[level]))
             break;
@@ -122,7 +126,7 @@ bool plr_track_stays(const plr_vision *v, const plr_expected_motion *m, const pl
 /* What is seen now becomes the patch; the error of the place in it stays from now on. */
 static void cut_anew(plr_vision *v, const plr_scene *s, plr_track *t) {
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
-    const unsigned levels = cut(&s->side[PLR_LEFT], t->at, patch);
+    const unsigned levels = cut(&s->side[PLR_LEFT], t->at, v->levels, patch);
     if (levels == 0)
         return;
     memcpy(t->patch, patch, levels * sizeof patch[0]);
@@ -133,10 +137,11 @@ static void cut_anew(plr_vision *v, const plr_scene *s, plr_track *t) {
 }
 
 bool plr_track_follow(plr_vision *v, const plr_scene *s, plr_track *t) {
+    plr_template template;
     plr_fit fit;
     const plr_real expected[2] = {t->at[0], t->at[1]};
     const bool found = find(v, &s->side[PLR_LEFT], (const uint8_t(*)[PLR_PATCH_BYTES])t->patch,
-                            t->levels - 1U, t->A, t->at, &fit);
+                            t->levels - 1U, t->A, t->at, &template, &fit);
     if (!found)
         return end(t, !fit.inside  ? PLR_TRACK_LEFT_VIEW
                       : !fit.ended ? PLR_TRACK_MOVED
@@ -177,7 +182,7 @@ bool plr_track_begin(const plr_vision *v, const plr_scene *s, plr_track *t, cons
         return false;
     t->A[0] = t->A[3] = 1;
     t->likeness = 1;
-    t->levels = (uint8_t)cut(&s->side[PLR_LEFT], t->at, t->patch);
+    t->levels = (uint8_t)cut(&s->side[PLR_LEFT], t->at, v->levels, t->patch);
     t->id = v->next_id;
     return t->levels > 0;
 }
@@ -192,10 +197,11 @@ enum { SEARCH_WIDEST = 200 }; /* px of the level in which the epipolar line is s
 
 /* A place in the right picture by the left patch, cut now: the two share exposure and view. */
 static bool fit_right(plr_vision *v, const plr_scene *s, const uint8_t (*patch)[PLR_PATCH_BYTES],
-                      unsigned from, const plr_real A[4], plr_track *t, plr_real at[2]) {
+                      unsigned from, const plr_real A[4], plr_track *t, plr_real at[2],
+                      plr_template *template) {
     plr_fit fit;
     plr_real X[3], left[2], right[2];
-    if (!find(v, &s->side[PLR_RIGHT], patch, from, A, at, &fit) ||
+    if (!find(v, &s->side[PLR_RIGHT], patch, from, A, at, template, &fit) ||
         !plr_rig_point(v, &s->motion, PLR_LEFT, t->at, plr_rig_depth(v, t->surface.disparity), X))
         return false;
     plr_rig_virtual(v, PLR_LEFT, X, left);
@@ -218,10 +224,8 @@ static plr_real slope_prior(const plr_vision *v, const plr_track *t) {
     return by * by;
 }
 
-/* slope <- the mean of what a fit measures, of the older fits, which count less and less, and of the prior,
- * which is not forgotten: a slope that fits do not tell tends to that of a surface that faces the camera. */
-static void weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
-                        const plr_real measured[2], const plr_real fit[3]) {
+void plr_track_weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
+                           const plr_real measured[2], const plr_real fit[3]) {
     const plr_real was[2] = {PLR_FMA(prior + info[0], slope[0], info[1] * slope[1]),
                              PLR_FMA(prior + info[2], slope[1], info[1] * slope[0])};
     const plr_real is[2] = {PLR_FMA(fit[0], measured[0], fit[1] * measured[1]),
@@ -243,36 +247,35 @@ static void weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
 }
 
 /* What the fit at `at` leaves over tells how the surface lies. */
-static void learn_slope(const plr_vision *v, const plr_scene *s, const uint8_t *patch,
+static void learn_slope(const plr_vision *v, const plr_scene *s, const plr_template *template,
                         const plr_real A[4], plr_track *t, const plr_real at[2]) {
-    plr_template template;
     plr_real beside[2], c[2], change[2], info[3];
     plr_surface nearer = t->surface;
     nearer.disparity += 1;
     const plr_real d = det(A);
-    if (!plr_template_make(&template, patch) ||
-        !plr_rig_across(v, &s->motion, t->at, &t->surface, c, NULL) ||
+    if (!plr_rig_across(v, &s->motion, t->at, &t->surface, c, NULL) ||
         !plr_rig_across(v, &s->motion, t->at, &nearer, beside, NULL) || !(plr_abs(d) > PLR_R(0.01)))
         return;
     const plr_real e[2] = {beside[0] - c[0], beside[1] - c[1]};
     c[0] = PLR_FMA(A[3], e[0], -(A[1] * e[1])) / d, c[1] = PLR_FMA(A[0], e[1], -(A[2] * e[0])) / d;
-    if (!plr_patch_slope(&s->side[PLR_RIGHT].level[0], &template, at, A, c, change, info))
+    if (!plr_patch_slope(&s->side[PLR_RIGHT].level[0], template, at, A, c, change, info))
         return;
     for (int i = 0; i < 3; i++)
         info[i] *= SLOPE_SHARE;
     const plr_real measured[2] = {t->surface.slope[0] + change[0], t->surface.slope[1] + change[1]};
-    weigh_slope(t->surface.slope, t->slope_info, slope_prior(v, t), measured, info);
+    plr_track_weigh_slope(t->surface.slope, t->slope_info, slope_prior(v, t), measured, info);
 }
 
 /* Fits the right picture with the patch deformed as the surface lies, and learns how it does. */
 static bool match_by_slope(plr_vision *v, const plr_scene *s,
                            const uint8_t (*patch)[PLR_PATCH_BYTES], unsigned from, plr_track *t,
                            plr_real at[2]) {
+    plr_template template;
     plr_real A[4];
     if (!plr_rig_across(v, &s->motion, t->at, &t->surface, at, A) ||
-        !fit_right(v, s, patch, from, A, t, at))
+        !fit_right(v, s, patch, from, A, t, at, &template))
         return false;
-    learn_slope(v, s, patch[0], A, t, at);
+    learn_slope(v, s, &template, A, t, at);
     return true;
 }
 
@@ -326,21 +329,20 @@ static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t, c
 }
 
 bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool birth) {
-    uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];
-    const uint8_t(*const kept)[PLR_PATCH_BYTES] = (const uint8_t(*)[PLR_PATCH_BYTES])patch;
+    uint8_t patch[2][PLR_PATCH_BYTES];
     plr_real at[2];
-    const unsigned levels = cut(&s->side[PLR_LEFT], t->at, patch);
-    if (levels == 0)
+    if (!birth) {
+        const unsigned wanted = search_level(v, v->levels) > 0 ? 2 : 1;
+        const unsigned levels = cut(&s->side[PLR_LEFT], t->at, wanted, patch);
+        return levels > 0 &&
+               match_by_slope(v, s, (const uint8_t(*)[PLR_PATCH_BYTES])patch, levels - 1, t, at);
+    }
+    const uint8_t(*const born)[PLR_PATCH_BYTES] = (const uint8_t(*)[PLR_PATCH_BYTES])t->patch;
+    const unsigned level = search_level(v, t->levels);
+    if (!search_line(v, s, t, born[level], level, false, &t->surface.disparity))
         return false;
-    const unsigned level = search_level(v, levels), from = level > 0 ? 1 : 0;
-    if (!birth)
-        return match_by_slope(v, s, kept, from, t, at);
-    plr_real disparity;
-    if (!search_line(v, s, t, kept[level], level, false, &disparity))
-        return false;
-    t->surface.disparity = disparity;
     for (int again = 0; again < SLOPE_FITS; again++)
-        if (!match_by_slope(v, s, kept, again == 0 ? level : 0, t, at))
+        if (!match_by_slope(v, s, born, again == 0 ? level : 0, t, at))
             return false;
     return true;
 }

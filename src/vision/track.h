@@ -35,4 +35,10 @@ bool plr_track_stays(const plr_vision *v, const plr_expected_motion *m, const pl
 /* Whether the track is found as if the right picture were the left one. */
 bool plr_track_mirrored(plr_vision *v, const plr_scene *s, const plr_track *t);
 
+/* slope <- the mean of what a fit measures, of the older fits, which count less and less, and of the prior 0,
+ * which is not forgotten: a slope that fits do not tell tends to that of a surface that faces the camera. `info`
+ * and `fit` are inverses of covariances, xx xy yy, `prior` that of a variance. */
+void plr_track_weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
+                           const plr_real measured[2], const plr_real fit[3]);
+
 #endif

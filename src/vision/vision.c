@@ -81,27 +81,29 @@ plr_status plr_vision_forget(plr_vision *v) {
 
 /* --- what is expected --- */
 
-/* w = the turn of R over dt; u = p over dt, both constant meanwhile. */
+/* The motion since the last pair, and how points move within this one: as the velocity says, else as since
+ * the last pair, on average. */
 static void take_motion(const plr_vision *v, const plr_expected *e, const plr_picture_pair *pair,
                         plr_expected_motion *m) {
     memset(m, 0, sizeof *m);
     plr_mat3_identity(m->R);
     const plr_time_ns left = pair->left.t_ns, right = pair->right.t_ns;
     m->right_late = (plr_real)((double)(int64_t)(right - left) * 1e-9);
-    if (!e || !v->has_pair)
-        return;
-    for (int i = 0; i < 9; i++)
+    m->known = e && (v->has_pair || e->velocity_known);
+    for (int i = 0; m->known && v->has_pair && i < 9; i++)
         m->R[i] = (plr_real)e->motion.R[i];
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; m->known && v->has_pair && i < 3; i++)
         m->p[i] = (plr_real)e->motion.p[i];
-    const plr_real rate = (plr_real)(1e9 / (double)(left - v->t_ns));
-    plr_turn_of(m->w, m->R);
-    for (int i = 0; i < 3; i++) {
-        m->w[i] *= rate;
-        m->u[i] = m->p[i] * rate;
-    }
-    m->known = true;
     m->place_known = plr_dot3(m->p, m->p) > 0;
+    if (m->known && e->velocity_known) {
+        for (int i = 0; i < 3; i++)
+            m->w[i] = -(plr_real)e->w_C_radps[i], m->u[i] = -(plr_real)e->v_C_mps[i];
+    } else if (m->known) {
+        const plr_real rate = (plr_real)(1e9 / (double)(left - v->t_ns));
+        plr_turn_of(m->w, m->R);
+        for (int i = 0; i < 3; i++)
+            m->w[i] *= rate, m->u[i] = m->p[i] * rate;
+    }
 }
 
 /* The depth that the caller knows, as a disparity. */
@@ -214,13 +216,14 @@ static bool begin(plr_vision *v, const plr_scene *s, const plr_real at[2], plr_r
 }
 
 static void fill(plr_vision *v, const plr_scene *s) {
+    plr_corner corners[PLR_CORNERS];
     if (v->track_count >= v->wanted)
         return;
-    plr_corners_find(v, &s->side[PLR_LEFT]);
+    const unsigned n = plr_corners_find(v, &s->side[PLR_LEFT], corners);
     const plr_real apart = (plr_real)plr_cells_of(v->width, v->height).side_px / 2;
     unsigned tries = 2U * (unsigned)(v->wanted - v->track_count) + MORE_TRIES;
-    for (unsigned i = 0; i < v->corner_count && v->track_count < v->wanted && tries > 0; i++) {
-        const plr_real at[2] = {(plr_real)v->corners[i].u, (plr_real)v->corners[i].v};
+    for (unsigned i = 0; i < n && v->track_count < v->wanted && tries > 0; i++) {
+        const plr_real at[2] = {(plr_real)corners[i].u, (plr_real)corners[i].v};
         if (is_taken(v, at, apart))
             continue;
         tries--;
@@ -290,6 +293,7 @@ static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
         v->observations[n] = o;
         v->sights[n++] = sight;
     }
+    plr_watch_rows(v, &s->motion, n);
     frame->count = (uint16_t)leave_out_strays(v, n);
 }
 
@@ -315,7 +319,6 @@ static void look(plr_vision *v, const plr_scene *s, const plr_expected *e, plr_f
     if (!(v->report.right & PLR_PICTURE_UNUSABLE))
         fill(v, s);
     v->report.swapped = v->mirrored >= SWAPPED_AFTER && v->mirrored > 3 * v->proper;
-    plr_watch_rows(v, &s->motion);
     hand_out(v, s, frame);
 }
 

@@ -61,26 +61,22 @@ uint8_t plr_watch_picture(const plr_levels *l, uint32_t *hash, bool first) {
     return faults;
 }
 
-/* Sums over the seen tracks: px by which the right row is lower, and px/s by which it moves. */
-static unsigned rows_of(const plr_vision *v, const plr_expected_motion *m, plr_real *gap,
-                        plr_real *rate) {
-    unsigned n = 0;
-    for (unsigned i = 0; i < v->track_count; i++) {
-        const plr_track *t = &v->tracks[i];
-        const plr_real depth = plr_rig_depth(v, t->surface.disparity);
-        plr_real L[3], R[3], left[2], right[2], turn[3];
-        if (!t->seen || !plr_rig_point(v, m, PLR_LEFT, t->at, depth, L) ||
-            !plr_rig_point(v, m, PLR_RIGHT, t->right, depth, R))
-            continue;
-        plr_rig_virtual(v, PLR_LEFT, L, left);
-        plr_rig_virtual(v, PLR_RIGHT, R, right);
-        plr_cross3(turn, m->w, L);
-        const plr_real y = (turn[1] + m->u[1]) / L[2], z = (turn[2] + m->u[2]) / L[2];
-        *gap += right[1] - left[1];
-        *rate += PLR_FMA(v->fy, y, -((left[1] - v->cy) * z));
-        n++;
+/* The means over n observations: px by which the right row is lower, and px/s by which it moves. */
+static void rows_of(const plr_vision *v, const plr_expected_motion *m, unsigned n, plr_real *gap,
+                    plr_real *rate) {
+    *gap = *rate = 0;
+    for (unsigned i = 0; i < n; i++) {
+        const plr_observation *o = &v->observations[i];
+        const plr_real by = 1 / plr_rig_depth(v, (plr_real)(o->uL_px - o->uR_px));
+        const plr_real down = (plr_real)o->vL_px - v->cy;
+        const plr_real ray[3] = {((plr_real)o->uL_px - v->cx) / v->fx, down / v->fy, 1};
+        plr_real turn[3];
+        plr_cross3(turn, m->w, ray);
+        *gap += (plr_real)(o->vR_px - o->vL_px);
+        *rate +=
+            PLR_FMA(v->fy, PLR_FMA(m->u[1], by, turn[1]), -(down * PLR_FMA(m->u[2], by, turn[2])));
     }
-    return n;
+    *gap /= (plr_real)n, *rate /= (plr_real)n;
 }
 
 /* Later by s, the right rows differ by s times their rate, beside what the calibration makes constant. */
@@ -96,12 +92,11 @@ static void tell_delay(plr_vision *v) {
     v->report.halves_sigma_s = (float)PLR_SQRT((rest > 0 ? rest : 0) / (g->count - 2) / rate2);
 }
 
-void plr_watch_rows(plr_vision *v, const plr_expected_motion *m) {
+void plr_watch_rows(plr_vision *v, const plr_expected_motion *m, unsigned n) {
     plr_row_gaps *g = &v->gaps;
-    plr_real gap = 0, rate = 0;
-    const unsigned n = m->known ? rows_of(v, m, &gap, &rate) : 0;
-    if (n >= LEAST_TRACKS) {
-        gap /= (plr_real)n, rate /= (plr_real)n;
+    if (m->known && n >= LEAST_TRACKS) {
+        plr_real gap, rate;
+        rows_of(v, m, n, &gap, &rate);
         g->count = plr_leaky_sum(g->count, KEEP, PLR_R(1));
         g->rate = plr_leaky_sum(g->rate, KEEP, rate);
         g->gap = plr_leaky_sum(g->gap, KEEP, gap);

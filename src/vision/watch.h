@@ -18,7 +18,7 @@ plr_status plr_check_expected(const plr_expected *e);
 /* Bits of plr_picture_fault. *hash is of the last picture and becomes this one's; `first`: there is none. */
 uint8_t plr_watch_picture(const plr_levels *l, uint32_t *hash, bool first);
 
-/* Adds what the tracks of this pair show: by how much rows differ, and how fast they move. */
-void plr_watch_rows(plr_vision *v, const plr_expected_motion *m);
+/* Adds what n observations of this pair show: by how much rows differ, and how fast they move. */
+void plr_watch_rows(plr_vision *v, const plr_expected_motion *m, unsigned n);
 
 #endif

@@ -14,7 +14,7 @@
 #include "support/state_bytes.h"
 #include "support/wrong_camera.h"
 
-enum { RUNS = PELORUS_SHORT_FORM ? 4 : 12, FRAMES = PELORUS_SHORT_FORM ? 300 : 600 };
+enum { RUNS = PELORUS_SHORT_FORM ? 3 : 12, FRAMES = PELORUS_SHORT_FORM ? 200 : 600 };
 enum { ERRORS = PLR_CAMERA_TURN_Z + 1, STEP_NS = 100000000 };
 
 static plr_filter filter;

@@ -91,7 +91,7 @@ static void test_an_imus_velocity_is_as_sure_in_the_dark_wherever_frames_stand(v
 
 /* ---------------------------------------------------------------- twists */
 
-enum { SEEDS = PELORUS_SHORT_FORM ? 50 : 200, TWISTS = 100, TWISTS_PER_FRAME = 10 };
+enum { SEEDS = PELORUS_SHORT_FORM ? 20 : 200, TWISTS = 100, TWISTS_PER_FRAME = 10 };
 static const plr_time_ns START_NS = 1000000000, TWIST_NS = 10000000;
 static const double V_MPS = 1.5, W_RADPS = 0.2, V_SIGMA = 0.05, W_SIGMA = 0.01;
 

@@ -11,11 +11,12 @@
 enum { PAIRS = PELORUS_SHORT_FORM ? 300 : 2000, PAIRS_OF_A_RIG = 8 };
 
 static plr_vision eyes;
-static rng chance;
+static rng chance, speeds;
 static texture scene;
 
 void setUp(void) {
     chance = rng_seeded(484);
+    speeds = rng_seeded(7);
     scene = texture_of(3);
 }
 
@@ -59,6 +60,11 @@ static plr_expected any_expected(plr_depth *depths) {
     for (int i = 0; i < 3; i++)
         e.motion.p[i] =
             rng_below(&chance, 3) ? rng_normal(&chance) * 0.2 : rng_uniform(&chance, -100, 100);
+    e.velocity_known = rng_below(&speeds, 2);
+    for (int i = 0; i < 3; i++) {
+        e.v_C_mps[i] = rng_uniform(&speeds, -1000, 1000) * (rng_below(&speeds, 3) ? 1e-3 : 1);
+        e.w_C_radps[i] = rng_uniform(&speeds, -100, 100) * (rng_below(&speeds, 3) ? 1e-2 : 1);
+    }
     for (unsigned i = 0; i < 20; i++) {
         static const float odd[5] = {0, -1, 1e-30F, 1e30F, 2};
         depths[i].id = rng_below(&chance, 100);

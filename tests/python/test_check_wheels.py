@@ -28,7 +28,7 @@ from replay_drive import BIN
 
 HALF_M = 0.25  # of the track
 OPTIONS = Options(
-    duration_s=60.0,
+    duration_s=40.0,
     speed_mps=1.0,
     lap_s=20.0,
     imu=SimulatedImu(imu_rate_hz=200.0, rest_s=2.0),
@@ -38,7 +38,7 @@ OPTIONS = Options(
 
 @pytest.fixture(scope="module")
 def drive() -> Recording:
-    """A minute at 1 m/s, round and round."""
+    """Forty seconds at 1 m/s, round and round."""
     return simulate(OPTIONS).recording
 
 
@@ -104,7 +104,7 @@ def test_a_sigma_that_is_too_small_is_told(drive: Recording) -> None:
 def test_a_wrong_radius_has_one_verdict_in_every_command_until_the_filter_estimates_it(
     tmp_path: Path, pelorus: Run
 ) -> None:
-    short = simulate(replace(OPTIONS, duration_s=24.0, seed=3)).recording
+    short = simulate(replace(OPTIONS, duration_s=16.0, seed=3)).recording
     path, conf = tmp_path / "drive.plr", tmp_path / "tuned.conf"
     replace(short, readings=scaled(short.readings, 1.06)).write(path)
     before = json.loads(pelorus("explain", path, "--json").out)

@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pelorus import Calibration, FilterError, PelorusError, Tracker
+from pelorus.math.se3 import Poses
+from pelorus.online import diagnosis
+from pelorus.online.eyes import OpenCvEyes, open_eyes
 from pelorus.rig.lens import Lens, LensModel
+from pelorus.rig.read import Calibrated
 from pelorus.tracker import PictureFault
 
 WIDTH, HEIGHT, DISPARITY = 160, 120, 7
@@ -98,3 +102,38 @@ def test_a_lens_that_is_not_followed_as_it_is_is_said() -> None:
     rig = Tracker.rectified(CAMERA, WIDTH, HEIGHT).rig
     with pytest.raises(PelorusError, match="rectify the pictures first"):
         Tracker(replace(rig, left=omni))
+
+
+def test_opencv_takes_cameras_that_own_eyes_cannot_and_it_is_told_with_the_remedy() -> None:
+    rig = replace(Tracker.rectified(CAMERA, WIDTH, HEIGHT).rig, T_LB=Poses(np.eye(3), np.zeros(3)))
+    header = rig.header(rig.rectification(), "taken as it is")
+    eyes, why = open_eyes(Calibrated(header, rig), "own")
+    assert not isinstance(eyes, OpenCvEyes)
+    assert not why
+    assert not diagnosis.of_eyes(why)
+    omni = Lens(LensModel.OMNI, (200.0, 200.0, 80.0, 60.0), (1.0,), WIDTH, HEIGHT)
+    odd = replace(rig, left=omni, right=omni)
+    eyes, why = open_eyes(Calibrated(header, odd), "own")
+    assert isinstance(eyes, OpenCvEyes)
+    (told,) = diagnosis.of_eyes(why)
+    assert told.level is diagnosis.Level.WARN
+    assert "a lens omni" in told.message
+    assert "rectify the pictures" in told.do
+    large = replace(header, image_width_px=4000, image_height_px=3000)
+    eyes, why = open_eyes(Calibrated(large, None), "own")
+    assert isinstance(eyes, OpenCvEyes)
+    assert why
+    assert not open_eyes(Calibrated(header, odd), "opencv")[1]  # that is what was asked for
+
+
+def test_a_velocity_is_three_and_three_numbers() -> None:
+    tracker = Tracker.rectified(CAMERA, WIDTH, HEIGHT, tracks=30, row_time_s=1e-4)
+    with pytest.raises(PelorusError, match="velocity"):
+        tracker.track(1, *pair(0), velocity=(np.zeros(2), np.zeros(3)))
+    still = tracker.track(1, *pair(0), velocity=(np.zeros(3), np.zeros(3)))
+    tracker.forget()
+    moving = tracker.track(2, *pair(0), velocity=((1.0, 0, 0), np.zeros(3)))
+    depth = CAMERA.fx_px * CAMERA.baseline_m / DISPARITY
+    rows = still.pixels[:, 1] - (HEIGHT - 1) / 2
+    due = CAMERA.fx_px / depth * 1e-4 * rows
+    assert np.abs(moving.pixels[:, 0] - still.pixels[:, 0] - due).max() < 0.05

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Eyes (src/vision) on the rendered drive of docs/images/hero.py, where the truth is exact.
 
-usage: eyes_rendered.py [--draws 4] [--only TEXT] [--opencv] [--points 100]
+usage: eyes_rendered.py [--draws 4] [--first 3] [--only TEXT] [--opencv] [--points 100]
+                        [--shutter-ms 20]
 
-Its pictures are rendered once into build/hero and build/hero-rolling, some ten minutes in all. Each
-draw has its own noise of the odometry, which also tells the eyes what to expect.
+Its pictures are rendered once into build/hero and build/hero-rolling-20, some ten minutes in all.
+Each draw has its own noise of the odometry, which also tells the eyes what to expect, and how the
+camera moves at the time of a pair: the mean of the twists that end and begin there.
 
 as it is     the pictures of README
 exposure     every second 20 pairs are 1.5 times as bright
 moving       a board over 20 % of the picture goes to and fro, 4 m ahead
-rolling      a shutter of 20 ms, told as row_time_s; a frame's time is its middle row's
+rolling      a shutter of 20 ms (--shutter-ms), told as row_time_s; a frame's time is that of its
+             middle row
 
 RMS         of the position, cm: median and worst of the draws
 NEES/3      mean; 1 is expected
@@ -25,6 +28,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -45,7 +49,6 @@ import street  # type: ignore[import-not-found]  # noqa: E402
 
 Gray = NDArray[np.uint8]
 Pair = tuple[Gray, Gray]
-SHUTTER_S = 0.020
 DRIFT_PAIRS = 10
 GATE = 16.3  # of the squares of three errors: four sigma
 
@@ -100,13 +103,23 @@ def motions(seed: int) -> Iterator[Poses | None]:
         yield se3.conjugate(T_CB, se3.inverse(Poses(R, p))) if k else None
 
 
+def velocities(seed: int) -> Iterator[tuple[Floats, Floats] | None]:
+    """Yields v and w of the camera at each pair: the mean of the twists beside it."""
+    steps = hero.twists(seed)
+    for before, after in pairwise([*steps, []]):
+        beside = [*before[-1:], *after[:1]]
+        v, w = (np.mean([one[i] for one in beside], axis=0) for i in (1, 2))
+        yield hero.R_CB @ v, hero.R_CB @ w
+
+
 def seen_by(pairs: list[Pair], seed: int, points: int, shutter_s: float) -> list[Seen]:
     """Returns the result of each pair."""
     size, row_s = (street.WIDTH, street.HEIGHT), shutter_s / street.HEIGHT
     tracker = Tracker.rectified(hero.camera(), *size, tracks=points, row_time_s=row_s)
+    moved = zip(pairs, motions(seed), velocities(seed), strict=True)
     return [
-        tracker.track(10**9 + k * 10**9 // hero.RATE_HZ, *pair, motion=motion)
-        for k, (pair, motion) in enumerate(zip(pairs, motions(seed), strict=True))
+        tracker.track(10**9 + k * 10**9 // hero.RATE_HZ, *pair, motion=motion, velocity=velocity)
+        for k, (pair, motion, velocity) in enumerate(moved)
     ]
 
 
@@ -187,6 +200,8 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--draws", type=int, default=4)
+    parser.add_argument("--first", type=int, default=3, help="seed of the first draw")
+    parser.add_argument("--shutter-ms", type=int, default=20, help="of the rolling shutter")
     parser.add_argument("--points", type=int, default=100)
     parser.add_argument("--only", default="", help="variants whose names have this text")
     parser.add_argument("--opencv", action="store_true", help="its tracks of the pictures, too")
@@ -195,16 +210,17 @@ def main() -> int:
     print(f"{'':12}{'RMS':>7}{'worst':>7}{'NEES/3':>8}{'drift':>10}{'lasts':>11}   thirds")
     for name, change, shutter_s in (
         ("as it is", as_it_is, 0.0), ("exposure", exposed, 0.0), ("moving", moving(), 0.0),
-        ("rolling", as_it_is, SHUTTER_S),
+        ("rolling", as_it_is, given.shutter_ms * 1e-3),
     ):  # fmt: skip
         if given.only not in name:
             continue
-        kept = hero.KEPT.with_name("hero-rolling") if shutter_s else hero.KEPT
+        rolling = hero.KEPT.with_name(f"hero-rolling-{given.shutter_ms}")
+        kept = rolling if shutter_s else hero.KEPT
         colour = hero.rendered(kept, shutter_s)
         pairs = [
             change(k, (hero.gray(left), hero.gray(right))) for k, (left, right) in enumerate(colour)
         ]
-        seeds = range(3, 3 + given.draws)
+        seeds = range(given.first, given.first + given.draws)
         seen = [seen_by(pairs, seed, given.points, shutter_s) for seed in seeds]
         drives = [hero.drive(tracks_of(one), k) for one, k in zip(seen, seeds, strict=True)]
         sights = of_sights(seen[0]) if name == "as it is" else ""

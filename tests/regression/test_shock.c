@@ -8,7 +8,7 @@
 #include "support/imu_rig.h"
 
 enum { SECOND = 10 /* frames */, READINGS_PER_SECOND = 400 };
-enum { SEEDS = PELORUS_SHORT_FORM ? 2 : 4 };
+enum { SEEDS = PELORUS_SHORT_FORM ? 1 : 4 };
 
 void setUp(void) {
     imu_rig_set_up();

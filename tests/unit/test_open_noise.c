@@ -151,6 +151,14 @@ static void add_motion(double *P, bool bias) {
     free(GJ);
 }
 
+/* Landmarks and P along the motion that is held, without a correction. */
+static void carry(plr_filter *f) {
+    static const plr_real none[PLR_MAX_LD] = {0};
+    TEST_ASSERT_EQUAL_UINT8(1, f->belief.held.any);
+    (void)plr_model_of(&f->belief)->retract(&f->belief, &f->camera, &f->work, none);
+    TEST_ASSERT_EQUAL_UINT8(0, f->belief.held.any);
+}
+
 static void check_open_and_close(noise_kind kind, bool bias, bool shifted) {
     take_specimen(kind, bias, shifted);
     const plr_motion pending = filter.motion;
@@ -168,6 +176,7 @@ static void check_open_and_close(noise_kind kind, bool bias, bool shifted) {
     TEST_ASSERT_EQUAL_INT(
         PLR_OK, plr_covariance_close_noise(&filter.belief, &filter.camera, &filter.work, nu));
     TEST_ASSERT_EQUAL_UINT8(0, filter.work.noise.open);
+    carry(&filter);
     double *got = specimen_covariance(&filter);
     const unsigned n = plr_covariance_dim(&filter.belief);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 300 * eps, 0, specimen_gap(n, expected, got), at);
@@ -258,12 +267,13 @@ static void retract_joint(const plr_filter *before, const plr_real *dx, joint_up
  * The oracle holds the noise in its P and loses digits by it: 1e-9 or so where that is huge. What the
  * filter loses is a few roundings of each standard deviation that is left, however large the noise. With
  * fewer points than tell a motion, what they leave open is still as large as the noise was, and the
- * retraction turns it.
+ * retraction turns it. Two points tell nothing of the turn about the line through both: its information is the prior's, 1,
+ * beside 1e6 and more in float32. Of 600 draws with one to three points the largest loss is 7e4 eps.
  */
 static void demand_joint(noise_kind kind, unsigned count, const plr_filter *before,
                          joint_update *joint) {
     const double oracle = kind == HUGE_NOISE ? 1e-8 : 1e-12;
-    const double few = kind == HUGE_NOISE && count < 6 ? 1e4 : 0;
+    const double few = kind != HUGE_NOISE || count >= 6 ? 0 : count > 3 ? 1e4 : 1e5;
     for (unsigned i = 0; i < joint->n; i++)
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE((oracle + 600 * eps) * sqrt(joint->P[i * joint->n + i]),
                                           joint->mean[i], (double)filter.work.dx[i], at);

@@ -146,6 +146,46 @@ static void test_an_expected_turn_is_followed_where_nothing_else_would_find_it(v
     TEST_ASSERT_GREATER_OR_EQUAL(8, compare(born, n, -W * tan(turn), 0, &rms));
 }
 
+/* The wall from x px further on, by a camera that goes to the right at v m/s and reads row after row; it went
+ * there from the last pair at another velocity. Returns by how many px a row is later than the one above. */
+static double look_rolling(double x, double moved_px, double v_mps) {
+    const double depth = 0.1 * W / DISPARITY, row_px = v_mps * (double)eyes.row_time * W / depth;
+    plr_expected e;
+    memset(&e, 0, sizeof e);
+    e.motion.R[0] = e.motion.R[4] = e.motion.R[8] = 1;
+    e.motion.p[0] = -moved_px * depth / W;
+    e.velocity_known = true, e.v_C_mps[0] = v_mps;
+    view how = view_at(x - row_px * (H - 1) / 2, 0);
+    how.A[1] = row_px;
+    draw(&how);
+    TEST_ASSERT_EQUAL(PLR_OK, look(&e));
+    return row_px;
+}
+
+static void test_rows_of_a_rolling_shutter_are_moved_by_the_velocity_at_the_pair(void) {
+    static plr_observation born[PLR_VISION_TRACKS];
+    plr_rig rig = rectified_rig(W, H);
+    rig.tracks = 32, rig.row_time_s = 2e-4;
+    TEST_ASSERT_EQUAL(PLR_OK, plr_vision_init(&eyes, &rig));
+    const double row_px = look_rolling(0, 0, 2); /* 3 px from the first row to the last */
+    const unsigned n = frame.count;
+    TEST_ASSERT_GREATER_OR_EQUAL(20, n);
+    for (unsigned i = 0; i < n; i++) {
+        const plr_observation *o = &frame.observations[i];
+        unsigned j = 0;
+        while (eyes.tracks[j].id != o->id)
+            j++;
+        const double by = row_px * ((double)o->vL_px - (H - 1) / 2.0);
+        TEST_ASSERT_DOUBLE_WITHIN(0.01, by, (double)(o->uL_px - (float)eyes.tracks[j].at[0]));
+        born[i] = *o;
+    }
+    double rms;
+    (void)look_rolling(3, 3,
+                       -2); /* it has turned back: the mean since the last pair tells nothing */
+    TEST_ASSERT_GREATER_OR_EQUAL(15, compare(born, n, -3, 0, &rms));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.15, rms);
+}
+
 static void test_exposure_steps_lose_no_track(void) {
     view how = view_at(0, 0);
     how.gain = 24, how.offset = 90;
@@ -367,7 +407,11 @@ static void test_what_cannot_be_used_is_refused_and_changes_nothing(void) {
     demand_refused(PLR_E_NOT_FINITE, &good, &e);
     e.motion.p[2] = 1000;
     demand_refused(PLR_E_RANGE, &good, &e);
-    e.motion.p[2] = 0, e.depth_count = 3;
+    e.motion.p[2] = 0, e.velocity_known = true, e.v_C_mps[1] = 1001;
+    demand_refused(PLR_E_RANGE, &good, &e);
+    e.v_C_mps[1] = 0, e.w_C_radps[2] = (double)NAN;
+    demand_refused(PLR_E_NOT_FINITE, &good, &e);
+    e.velocity_known = false, e.depth_count = 3;
     demand_refused(PLR_E_ARGUMENT, &good, &e);
 }
 

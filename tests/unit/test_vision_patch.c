@@ -9,6 +9,7 @@
 #include "support/vision_twin.h"
 #include "vision/patch.h"
 #include "vision/pyramid.h"
+#include "vision/track.h"
 
 enum { W = 64, H = 48, U = 32, V = 24 }; /* and the middle */
 
@@ -227,6 +228,53 @@ static void test_a_slope_is_read_from_what_a_fit_leaves_over(void) {
 }
 
 /* The told covariance is that of the errors, where noise is all that is wrong. */
+/* (prior I + sum k^age F)^-1 sum k^age F m, summed anew over all fits. */
+static void slope_twin(double slope[2], double prior, double (*fit)[3], double (*measured)[2],
+                       int n) {
+    double a = prior, b = 0, c = prior, x = 0, y = 0;
+    for (int i = 0; i < n; i++) {
+        const double w = pow(0.9, n - 1 - i), *F = fit[i], *m = measured[i];
+        a += w * F[0], b += w * F[1], c += w * F[2];
+        x += w * (F[0] * m[0] + F[1] * m[1]), y += w * (F[1] * m[0] + F[2] * m[1]);
+    }
+    const double det = a * c - b * b;
+    slope[0] = (c * x - b * y) / det, slope[1] = (a * y - b * x) / det;
+}
+
+static void test_a_slope_is_the_mean_of_all_fits_and_of_a_prior_that_stays(void) {
+    enum { FITS = 30 };
+    for (int round = 0; round < 50; round++) {
+        double fits[FITS][3], told[FITS][2], twin[2];
+        plr_real slope[2] = {0, 0}, info[3] = {0, 0, 0};
+        const double prior = rng_uniform(&chance, 1, 100);
+        for (int n = 0; n < FITS; n++) {
+            const double p = rng_normal(&chance), q = rng_normal(&chance), s = rng_normal(&chance);
+            fits[n][0] = 50 * p * p, fits[n][1] = 50 * p * q, fits[n][2] = 50 * (q * q + s * s);
+            told[n][0] = 0.3 * rng_normal(&chance), told[n][1] = 0.3 * rng_normal(&chance);
+            const plr_real fit[3] = {(plr_real)fits[n][0], (plr_real)fits[n][1],
+                                     (plr_real)fits[n][2]};
+            const plr_real measured[2] = {(plr_real)told[n][0], (plr_real)told[n][1]};
+            plr_track_weigh_slope(slope, info, (plr_real)prior, measured, fit);
+            slope_twin(twin, prior, fits, told, n + 1);
+            for (int i = 0; i < 2 && fabs(twin[0]) < 0.9 && fabs(twin[1]) < 0.9; i++)
+                TEST_ASSERT_DOUBLE_WITHIN(1e-4, twin[i], (double)slope[i]);
+        }
+    }
+}
+
+static void test_a_slope_that_fits_tell_no_more_tends_to_that_of_a_facing_surface(void) {
+    plr_real slope[2] = {PLR_R(0.8), PLR_R(-0.5)}, info[3] = {40, 0, 40};
+    const plr_real nothing[3] = {0, 0, 0}, nowhere[2] = {0, 0};
+    double last = (double)slope[0];
+    for (int pair = 0; pair < 60; pair++) {
+        plr_track_weigh_slope(slope, info, 10, nowhere, nothing);
+        TEST_ASSERT_TRUE((double)slope[0] < last && slope[0] > 0);
+        last = (double)slope[0];
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0, (double)slope[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0, (double)slope[1]);
+}
+
 static void test_the_told_uncertainty_is_that_of_the_errors(void) {
     double squares = 0, worst = 0;
     const int runs = 300;

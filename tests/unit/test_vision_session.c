@@ -220,6 +220,9 @@ static void test_the_expected_motion_is_that_of_the_steps_since_the_last_pair(vo
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, -sin(0.02), T->R[2]); /* what was ahead goes to the left */
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, -0.05, T->p[0]);
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0, T->p[2]);
+    TEST_ASSERT_TRUE(eyes.expected.velocity_known);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-2, SPEED, eyes.expected.v_C_mps[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.4, eyes.expected.w_C_radps[1]);
 }
 
 /* In mapping a frame has the time of its TRUTH, and so has the motion that eyes expect. */

@@ -174,22 +174,29 @@ class Tracker:
         right: ArrayLike,
         *,
         motion: tuple[ArrayLike, ArrayLike] | None = None,
+        velocity: tuple[ArrayLike, ArrayLike] | None = None,
         depths: tuple[ArrayLike, ArrayLike] | None = None,
         t_right_ns: int | None = None,
     ) -> Seen:
         """Tracks the next pair, uint8 (rows, columns).
 
         `motion` (R, p) is how points are expected to have moved since the last pair, x -> R x + p
-        in the virtual camera; `depths` (ids, z_m) are known depths of tracks.
+        in the virtual camera, and `velocity` (v_mps, w_radps) how that camera moves at the time of
+        this pair: a rolling shutter needs it. `depths` (ids, z_m) are known depths of tracks.
         """
         lefts, rights = _grey("left", left), _grey("right", right)
         pair = vision.Pair(
             _picture(lefts, t_ns), _picture(rights, t_ns if t_right_ns is None else t_right_ns)
         )
         known = _depths(depths)
-        expected = None if motion is None else vision.Expected(
-            _pose(np.asarray(motion[0]), np.asarray(motion[1])), known.ctypes.data, len(known)
-        )  # fmt: skip
+        expected = None
+        if motion is not None or velocity is not None:
+            R, p = (np.eye(3), np.zeros(3)) if motion is None else motion
+            v, w = (np.zeros(3), np.zeros(3)) if velocity is None else velocity
+            expected = vision.Expected(
+                _pose(np.asarray(R), np.asarray(p)), known.ctypes.data, len(known),
+                velocity is not None, _three("velocity", v), _three("velocity", w),
+            )  # fmt: skip
         frame = Frame()
         status = self._library.vision_track(
             self._memory, c.byref(pair), None if expected is None else c.byref(expected),
@@ -231,6 +238,13 @@ def _lens(lens: Lens) -> vision.Lens:
         )
     k = (c.c_double * COEFFICIENTS_MAX)(*lens.coefficients)
     return vision.Lens(MODELS[lens.model], lens.width_px, lens.height_px, *lens.intrinsics, k)
+
+
+def _three(name: str, numbers: ArrayLike) -> c.Array[c.c_double]:
+    three = np.asarray(numbers, float)
+    if three.shape != (3,):
+        raise PelorusError(f"{name}: numbers of shape {three.shape}; twice (3,) is wanted")
+    return (c.c_double * 3)(*three.tolist())
 
 
 def _pose(R: Floats, p: Floats) -> Pose:

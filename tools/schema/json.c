@@ -176,7 +176,7 @@ static void print_all_words(const char *key, const word *words, size_t n, const 
 static void print_limit_table(void) {
     printf("  \"limits\": {\n");
     for (size_t i = 0; i < schema_limit_rows; i++)
-        printf("    \"%s\": %.0f%s\n", schema_limits[i].name, schema_limits[i].value,
+        printf("    \"%s\": %.15g%s\n", schema_limits[i].name, schema_limits[i].value,
                i + 1 < schema_limit_rows ? "," : "");
     printf("  },\n");
 }

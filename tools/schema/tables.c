@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "schema/tables.h"
 
+#include "pelorus/eyes.h"
 #include "pelorus/filter.h"
 #include "pelorus/wire.h"
 
@@ -142,5 +143,6 @@ const limit schema_limits[] = {
     {"rejected_landmarks", PLR_SUPERVISION_REJECTED},
     {"harmless_reasons", PLR_REASONS_HARMLESS},
     {"unknown_variance", PLR_WIRE_UNKNOWN_VARIANCE},
+    {"eyes_speed_sigma_mps", PLR_EYES_SPEED_SIGMA},
 };
 const size_t schema_limit_rows = LENGTH(schema_limits);

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.check.contents import AHEAD, Payloads, recording_of, write
+from pelorus.check.contents import AHEAD, Frames, recording_of
 from pelorus.check.options import Settings, options_of
 from pelorus.evaluate.evaluation import world_laid
 from pelorus.io.tracks import Tracks
@@ -124,15 +124,15 @@ class Parts:
 
     def _write(self, k: int, window: list[Message]) -> None:
         ids, masks = halves(recording_of(window).tracks)
-        payloads = {id(message): message.pack() for message in window}
-        self._add(k, "", window, payloads)
+        frames = Frames(window)
+        self._add(k, "", window, frames)
         for way, first in masks.items():
-            self._add(k, way, of_points(window, ids[first]), payloads)
-            self._add(k, way, of_points(window, ids[~first]), payloads)
+            self._add(k, way, of_points(window, ids[first]), frames)
+            self._add(k, way, of_points(window, ids[~first]), frames)
 
-    def _add(self, k: int, way: str, messages: list[Message], payloads: Payloads) -> None:
+    def _add(self, k: int, way: str, messages: list[Message], frames: Frames) -> None:
         path = self._folder / f"part-{len(self._parts)}.plr"
-        write(path, messages, payloads)
+        frames.write(path, messages)
         self._parts.append(_Part(k, way, path))
 
     def apart(self, settings: Settings) -> HalvesApart:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -17,7 +17,7 @@ from pelorus.io.tracks import Tracks
 from pelorus.math import inertial
 from pelorus.math.inertial import Inertial
 from pelorus.wire.frames import Imu, Kind, Message, Process, Reading, Start, Stereo, Twist
-from pelorus.wire.framing import Writer, header_of_messages
+from pelorus.wire.framing import Writer, encode, header_of_messages
 
 
 def recording_of(messages: Sequence[Message], process: Process | None = None) -> Recording:
@@ -170,14 +170,23 @@ def _reading_times(message: Message) -> list[int]:
     return message.times_ns if isinstance(message, Imu) else []
 
 
-Payloads = Mapping[int, bytes]  # of messages that stay, by their id()
-NONE_PACKED: Payloads = {}
+class Frames:
+    """Writes recordings that share messages; makes a frame once for each place in a file."""
 
+    def __init__(self, messages: Sequence[Message]) -> None:
+        self._shared = {id(message): message for message in messages}  # kept, so that ids hold
+        self._made: dict[tuple[int, int], bytes] = {}
 
-def write(path: Path, messages: Sequence[Message], payloads: Payloads = NONE_PACKED) -> None:
-    """Writes these messages as a recording; those in `payloads` are packed already."""
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        for message in messages:
-            writer.write(message, payloads.get(id(message)))
-        writer.end()
+    def write(self, path: Path, messages: Sequence[Message]) -> None:
+        """Writes these messages, shared or not, as a recording."""
+        with path.open("wb") as stream:
+            writer = Writer(stream)
+            for sequence, message in enumerate(messages):
+                if id(message) not in self._shared:
+                    writer.write(message)
+                    continue
+                key = id(message), sequence
+                if key not in self._made:
+                    self._made[key] = encode(message, sequence)
+                writer.write_frame(message.kind, self._made[key])
+            writer.end()

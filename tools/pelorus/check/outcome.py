@@ -20,6 +20,7 @@ import numpy as np
 
 from pelorus.check.apart import Parts
 from pelorus.check.contents import (
+    Frames,
     first_frames,
     half,
     not_before,
@@ -27,7 +28,6 @@ from pelorus.check.contents import (
     scaled,
     shifted,
     within,
-    write,
 )
 from pelorus.check.options import Settings, options_of
 from pelorus.io.trajectory import POSE_SIZE
@@ -97,8 +97,7 @@ class Bench:
         self.examined = recording_of(messages, asked)
         part = within(first_frames(messages), round(OFFSET_MOST_S * 1e9))
         self._messages = not_before(part, BEGIN_NS)
-        # A hundred recordings are written of them: each message is packed once.
-        self._payloads = {id(message): message.pack() for message in self._messages}
+        self._frames = Frames(self._messages)
         self._folder = folder
         self._program = program
         self._outlier_cost = outlier_cost(self.header, messages)
@@ -141,7 +140,7 @@ class Bench:
             messages = first_frames(messages, int(key[2])) if key[2] else messages
             messages = scaled(messages, float(key[3]))
             moved = shifted(messages, round(float(key[0]) * 1e9))
-            write(path, moved, self._payloads)
+            self._frames.write(path, moved)
             self._written[key] = path
         return self._written[key]
 

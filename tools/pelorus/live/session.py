@@ -112,6 +112,7 @@ class Session:
         """Returns what there is to say, the worst first; nothing where all is good."""
         found = [Status(name, Level.ERROR, words) for name, words in self.pipeline.blocked.items()]
         found += diagnosis.of_pairs(self.pipeline.pairing)
+        found += diagnosis.of_eyes(self.pipeline.not_own)
         found += diagnosis.of_halves(self.pipeline.together)
         found += diagnosis.of_speed(self.too_slow)
         found += diagnosis.of_odometry(self.odometry, self.pipeline.last, self.messages)

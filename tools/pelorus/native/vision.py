@@ -19,6 +19,7 @@ from pelorus.native.structure import (
     U64,
     Address,
     Bool,
+    Doubles3,
     Doubles8,
     Struct,
     of_header,
@@ -89,6 +90,9 @@ class Expected(Struct):
     motion: Pose
     depths: Address
     depth_count: U16
+    velocity_known: Bool
+    v_C_mps: Doubles3
+    w_C_radps: Doubles3
 
 
 @of_header("plr_sight")

@@ -10,10 +10,12 @@ import numpy as np
 
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
+from pelorus.wire import schema
 from pelorus.wire.layout import Floats
 
 KEPT_NS = 2_000_000_000  # velocities older than this say nothing of the next pair
-MOTION_SIGMA_MPS = 0.1  # a velocity that is known worse does not say where points will be
+# a velocity that is known worse does not say where points will be
+SPEED_SIGMA_MPS = schema.EYES_SPEED_SIGMA_MPS
 
 
 class Velocity(NamedTuple):
@@ -62,4 +64,4 @@ class ExpectedMotion:
 def known_velocity(velocity: Floats, covariance: Floats) -> Floats | None:
     """Returns the linear part of (v, w) where it is known well enough to tell where points are."""
     sigma = np.sqrt(np.diag(covariance)[:3])
-    return velocity[:3] if bool((sigma < MOTION_SIGMA_MPS).all()) else None
+    return velocity[:3] if bool((sigma < SPEED_SIGMA_MPS).all()) else None

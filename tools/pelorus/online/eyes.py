@@ -55,8 +55,9 @@ class OwnEyes:
         self._tracker = (
             own.Tracker.rectified(camera, *size) if rig is None else own.Tracker(rig, camera=camera)
         )
-        if size[0] * size[1] > self._tracker.pixels_max:
-            raise PelorusError(f"pictures of {size[0]} x {size[1]} pixels are too large")
+        most = self._tracker.pixels_max
+        if size[0] * size[1] > most:
+            raise PelorusError(f"pictures of {size[0]} x {size[1]} px have more than {most} pixels")
         self._rectification = rectification
         self._evidence = Evidence(Settings(), FIRST_LOOK)
 
@@ -103,17 +104,18 @@ def _doubt(evidence: Evidence, left: Gray, right: Gray) -> None:
         evidence.require_rectified((Path("left"), Path("right")))
 
 
-def open_eyes(calibrated: Calibrated, kind: Kind) -> Eyes:
-    """Returns the front end for pictures of this camera. A lens or a size that own eyes cannot take
-    is followed by OpenCV's."""
+def open_eyes(calibrated: Calibrated, kind: Kind) -> tuple[Eyes, str]:
+    """Returns the front end for pictures of this camera, and "". OpenCV's takes a lens or a size
+    that own eyes cannot take: then the words say why."""
     rig = calibrated.rig
     rectification = None if rig is None else rig.rectification()
+    why = ""
     if kind == "own":
         try:
-            return OwnEyes(calibrated, rectification)
-        except PelorusError:
-            pass
-    return OpenCvEyes(rectification)
+            return OwnEyes(calibrated, rectification), ""
+        except PelorusError as error:
+            why = str(error)
+    return OpenCvEyes(rectification), why
 
 
 def require_size(left: Gray, right: Gray, width_px: int, height_px: int) -> None:

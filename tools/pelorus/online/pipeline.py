@@ -77,7 +77,8 @@ class UnitCheck:
 
 
 class Pipeline:
-    """`blocked` says why nothing is told although data come: what was found cannot be right."""
+    """`blocked` says why nothing is told although data come: what was found cannot be right.
+    `not_own` says why OpenCV's tracker follows the pictures where own eyes were asked for."""
 
     def __init__(self, within_ns: int, remedy_for_g: str, eyes: Kind = "own") -> None:
         """`within_ns`: pictures whose stamps differ by so much at most belong together."""
@@ -90,6 +91,7 @@ class Pipeline:
     def begin(self) -> None:
         """Forgets what the sensors have shown; the odometry goes on."""
         self.blocked: dict[str, str] = {}
+        self.not_own = ""
         self.pairing: Pairing[Any] = Pairing(self.within_ns)
         self.joining = Joining()
         self._unit = UnitCheck(self._remedy)
@@ -107,7 +109,7 @@ class Pipeline:
         header = self.calibrated.header
         require_size(left, right, header.image_width_px, header.image_height_px)
         if self._eyes is None:
-            self._eyes = open_eyes(self.calibrated, self._kind)
+            self._eyes, self.not_own = open_eyes(self.calibrated, self._kind)
         motion = self._motion().until(t_ns + self._offset_ns)
         try:
             seen = self._eyes.see(t_ns, left, right, motion)

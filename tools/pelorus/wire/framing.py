@@ -85,12 +85,7 @@ class Counts:
 
 def encode(message: Message, sequence: int) -> bytes:
     """Returns one whole frame: COBS(kind, sequence, payload, CRC) and the delimiter."""
-    return framed(message.kind, message.pack(), sequence)
-
-
-def framed(kind: Kind, payload: bytes, sequence: int) -> bytes:
-    """Returns the frame of a message whose payload is packed already."""
-    body = struct.pack("<BH", kind, sequence % SEQUENCE_MODULUS) + payload
+    body = struct.pack("<BH", message.kind, sequence % SEQUENCE_MODULUS) + message.pack()
     return cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + DELIMITER
 
 
@@ -233,12 +228,15 @@ class Writer:
         self._counts: Counter[Kind] = Counter()
         self._written = 0
 
-    def write(self, message: Message, payload: bytes | None = None) -> None:
-        """Writes a frame; `payload` is the message's, where it is packed already."""
-        packed = message.pack() if payload is None else payload
-        self._stream.write(framed(message.kind, packed, self._written))
+    def write(self, message: Message) -> None:
+        """Writes a message as the next frame."""
+        self.write_frame(message.kind, encode(message, self._written))
+
+    def write_frame(self, kind: Kind, frame: bytes) -> None:
+        """Writes the next frame, which has been made with its number in the stream already."""
+        self._stream.write(frame)
         self._written += 1
-        self._counts[message.kind] += 1
+        self._counts[kind] += 1
 
     def end(self, heard: End | None = None) -> None:
         """Closes the stream; `heard` is a robot's END, whose numbers go into this one."""

@@ -75,6 +75,7 @@ SENSORS: dict[str, int] = {  # the small ones, by name
     row["name"].lower(): int(row["number"]) for row in _TABLES["enums"] if row["of"] == "sensor"
 }
 LIMITS: dict[str, int] = _TABLES["limits"]
+EYES_SPEED_SIGMA_MPS: float = _TABLES["limits"]["eyes_speed_sigma_mps"]
 PLAUSIBLE: dict[str, float] = _TABLES["plausible"]  # a session refuses larger values
 MESSAGES: dict[str, MessageTable] = {row["name"]: _message(row) for row in _TABLES["messages"]}
 SETTINGS: dict[int, Setting] = {row["id"]: _setting(row) for row in _TABLES["settings"]}

@@ -345,6 +345,7 @@ class Estimator:
             status.of_setup(self.blocked, self.waits_for),
             *status.of_inputs(self.topics(), fresh, self.counts, faults),
             *diagnosis.of_pairs(self.pipeline.pairing),
+            *diagnosis.of_eyes(self.pipeline.not_own),
             *diagnosis.of_halves(self.pipeline.together),
             *diagnosis.of_speed(fresh["too slow"]),
             *diagnosis.of_odometry(self.odometry, self.pipeline.last, self._messages()),
