@@ -25,7 +25,7 @@ from pelorus.check import (
     verdict,
 )
 from pelorus.check.biases import common_bias
-from pelorus.check.contents import first_frames, half, recording_of, shifted, write
+from pelorus.check.contents import Frames, first_frames, half, recording_of, shifted
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
 from pelorus.errors import PelorusError
@@ -104,7 +104,9 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
 def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) -> None:
     messages = framing.messages_of(simulated)
     late = tmp_path / "late.plr"
-    write(late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS))
+    Frames([]).write(
+        late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS)
+    )
     bench = Bench(built_programs().float32, late, tmp_path)
     true = {"pixel-sigma": "1.5", "velocity-sigma": "0.3", "gyro-sigma": "0.03"}
     offset = clock.of_twists(bench, true)
@@ -137,7 +139,7 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
 ) -> None:
     early = tmp_path / "early.plr"
     messages = [m for m in framing.messages_of(flown) if m.kind not in (Kind.END, Kind.TRUTH)]
-    write(early, shifted(messages, -20 * MS))
+    Frames([]).write(early, shifted(messages, -20 * MS))
     wrong = {"pixel-sigma": "2", "gyro-noise": "0.0005", "accel-noise": "0.3"}
     sets = [word for name, value in wrong.items() for word in ("--set", f"{name}={value}")]
     conf = tmp_path / "tuned.conf"
@@ -463,7 +465,7 @@ def test_a_recording_with_nothing_to_check_says_what_it_lacks(
     tmp_path: Path, pelorus: Run, kind: type[Message]
 ) -> None:
     path = tmp_path / "x.plr"
-    write(path, [m for m in drive(5) if not isinstance(m, kind)])
+    Frames([]).write(path, [m for m in drive(5) if not isinstance(m, kind)])
     said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN, status=1)
     assert ("no twists" if kind is Twist else "no stereo frames") in said.err
     assert not (tmp_path / "t.conf").exists()
@@ -478,7 +480,7 @@ def test_a_folder_is_refused_with_what_would_be_right(tmp_path: Path, pelorus: R
 
 def test_a_settings_file_that_is_none_is_refused_by_line(tmp_path: Path, pelorus: Run) -> None:
     path, conf = tmp_path / "x.plr", tmp_path / "bad.conf"
-    write(path, drive(5))
+    Frames([]).write(path, drive(5))
     conf.write_text("# mine\npixel-sigma 2\n", encoding="utf-8")
     said = pelorus(
         "check", path, "--config", conf, "--out", tmp_path / "t.conf", "--bin", BIN, status=1
