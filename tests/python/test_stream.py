@@ -353,7 +353,7 @@ def test_a_log_that_cannot_be_written_is_told(
     with TcpBoard(FakeBoard()) as served:
         log = tmp_path / "no-such-folder" / "flight.plr"
         said = pelorus("stream", recording, "--to", served.target, "--record", log, status=1)
-    assert f"{log}: cannot be written: No such file or directory" in said.err
+    assert f"{log}: cannot be written: there is no folder {log.parent}" in said.err
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")

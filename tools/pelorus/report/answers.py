@@ -137,7 +137,7 @@ def of_comparison(
 def _facts(compared: Comparison) -> str:
     summary = compared.main.summary
     header = compared.subject.header
-    readings = summary["imu_readings"]
+    readings = summary.get("imu_readings", 0)  # told where there is an IMU
     moved = f"{readings} IMU readings" if readings else f"{summary['twists']} twists"
     return (
         f"{compared.subject.path.name}: {summary['duration_s']:.1f} s, "
