@@ -91,7 +91,6 @@ def test_two_clocks_are_no_timing(monkeypatch: pytest.MonkeyPatch, one_clock: bo
         header=header(),
         examined=SimpleNamespace(twist_t_ns=[]),
         run=lambda _: NOTHING,
-        run_all=lambda many, _: [NOTHING for _ in many],
     )
     given = {"camera-offset": "0.01"}
     tuned = tuning.tune(cast(Any, bench), given, one_clock)

@@ -89,7 +89,7 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
 
 
 def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[str, float]:
-    """Searches from the likelier of two starts: the given noises, and those that the images show.
+    """Returns the likelier of two starts: the given noises, and those that the images show.
 
     With sigmas that are far too small a filter finds contradictions throughout and widens its
     covariance, which can be a local optimum many steps wide.
@@ -98,9 +98,8 @@ def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[s
     most = difference_of_a_reading(bench.examined, SPREAD_FRAMES)
     if most is not None:
         starts.append(dict(start) | _of_twists(start, most))
-    ran = bench.run_all([{**side, **written(some, TWIST)} for some in starts], "starts")
-    likelier = min(range(len(ran)), key=lambda k: ran[k].cost)
-    return search_noises(bench, side, starts[likelier], TWIST, COARSE).values
+    found = [search_noises(bench, side, some, TWIST, COARSE) for some in starts]
+    return min(found, key=lambda some: some.outcome.cost).values
 
 
 def _of_twists(start: Mapping[str, float], spread: TwistSpread) -> dict[str, float]:
