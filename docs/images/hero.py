@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Draws docs/images/hero.webp, the moving picture of README: pictures are rendered (street.py),
-points are followed by the tools' tracker, and the filter finds the way from them and odometry.
+points are followed by the library's eyes, and the filter finds the way from them and odometry.
 
 usage: PYTHONPATH=tools hero.py [FILE.webp]
 
@@ -25,8 +25,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from numpy.typing import NDArray
 from pelorus import Calibration, Filter, KnownLandmark, observations
-from pelorus.tracking.settings import Settings
-from pelorus.tracking.tracker import track
+from pelorus.tracking.eyes import Eyes, Shown, track
 from pelorus.io.tracks import Tracks
 from PIL import Image
 from scipy.spatial.transform import Rotation
@@ -120,6 +119,12 @@ def rendered(kept: Path = KEPT, shutter_s: float = 0) -> list[tuple[Pixels, Pixe
 def gray(picture: Pixels) -> Pixels:
     """As the tracker wants it."""
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
+
+
+def followed(pairs: list[tuple[Pixels, Pixels]]) -> Tracks:
+    """Points as `pelorus track` follows them."""
+    timed = [Shown(k * 10**9 // RATE_HZ, *pair) for k, pair in enumerate(pairs)]
+    return track(timed, Eyes(None, (street.WIDTH, street.HEIGHT)), (KEPT, KEPT))
 
 
 # --- the filter -----------------------------------------------------------------------------------
@@ -306,7 +311,7 @@ def main() -> None:
     """Renders, tracks, filters, draws."""
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/images/hero.webp"
     pairs = rendered()
-    tracks = track([(gray(a), gray(b)) for a, b in pairs], (KEPT, KEPT), Settings())
+    tracks = followed([(gray(left), gray(right)) for left, right in pairs])
     run = drive(tracks)
     error, own = run.p[-1] - run.truth[-1], np.sqrt(np.diag(run.P[-1]))
     drift = np.linalg.norm(run.odometry[-1] - run.truth[-1])

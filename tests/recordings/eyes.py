@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Eyes (src/vision) on real pictures, beside OpenCV's tracker in the same chain.
 
-usage: eyes.py [--bin build/bin] [--starts 10] [--opencv]
+usage: eyes.py [--bin build/bin] [--starts 10] [--convert] [--opencv]
 
 EuRoC MH_01's first ten seconds of $PELORUS_DATA (by default ../shared/data), whole and halved
 once and twice; the gyro alone predicts, with its bias in it; settings of
 tools/config/imu-adis16448.conf. Several starts, each a tenth of a second later: medians. An absent
 recording is left out.
+
+--convert: also the tracks of `pelorus convert`, whose motion is expected to go on as the pictures
+showed it; --opencv: also those of OpenCV's tracker (tests/python/opencv_tracker).
 
 err0, ATE   mm, as `pelorus evaluate` has them
 NEES/6      mean; 1 is expected
@@ -34,9 +37,14 @@ from pelorus.math.inertial import Inertial
 from pelorus.math.motion import Times
 from pelorus.rig.lens import Lens
 from pelorus.tracker import Tracker
-from pelorus.wire.frames import Camera
+from pelorus.wire.frames import Camera, Header
 from pelorus.wire.layout import Floats
 from scipy.spatial.transform import Rotation
+
+sys.path.insert(0, str(judge.ROOT / "tests/python"))
+
+from opencv_tracker import tracker
+from opencv_tracker.settings import Settings
 
 FOLDER = "images/euroc-mh01-start"
 SIZES = ((1, 60), (2, 50), (4, 50))  # halved so often, points
@@ -77,13 +85,13 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
     rig = found.calibrated.rig
     rig = replace(rig, left=shrunk(rig.left, times), right=shrunk(rig.right, times))
     assert rig.T_LB is not None
-    tracker = Tracker(rig, tracks=points)
-    camera = tracker.calibration(rig.T_LB.R, rig.T_LB.p)
+    own = Tracker(rig, tracks=points)
+    camera = own.calibration(rig.T_LB.R, rig.T_LB.p)
     t_ns = rig.on_body_clock(found.frames.t_ns)
     R = np.asarray(camera.R_CB)
     motion = [None, *((turn, np.zeros(3)) for turn in turns(t_ns, found.motion.inertial, R))]
     seen = [
-        tracker.track(int(t), small(left, times), small(right, times), motion=moved)
+        own.track(int(t), small(left, times), small(right, times), motion=moved)
         for t, (left, right), moved in zip(t_ns, found.frames.read(), motion, strict=True)
     ]
     tracks = Tracks.of_frames(
@@ -96,12 +104,36 @@ def followed(found: Streams, times: int, points: int) -> tuple[Recording, float]
         found.calibrated.header, camera=Camera(*five), R_CB=R, t_CB_m=np.asarray(camera.t_CB_m),
         image_width_px=rig.left.width_px, image_height_px=rig.left.height_px,
     )  # fmt: skip
+    return with_tracks(found, header, tracks), mean_length(tracks)
+
+
+def with_tracks(found: Streams, header: Header, tracks: Tracks) -> Recording:
+    """Returns the recording with these tracks in the place of pictures."""
+    rig = found.calibrated.rig
+    assert rig is not None
+    assert found.truth is not None
+    t_ns = rig.on_body_clock(found.frames.t_ns)
     of_tracks = replace(found, frames=streams.RawTracks(Path(), t_ns, tracks))
     made = streams.with_motion(header, of_tracks, t_ns, tracks)
-    assert found.truth is not None
     truth = streams.at_frames(found.truth, t_ns, found.motion)
+    return made.with_truth(truth.t_ns, truth.poses)
+
+
+def by_opencv(found: Streams) -> Recording:
+    """Returns the recording with the tracks of OpenCV's tracker."""
+    rig = found.calibrated.rig
+    assert rig is not None
+    assert isinstance(found.frames, Pictures)
+    rectification = rig.rectification()
+    pairs = (rectification.pictures(*pair) for pair in found.frames.read())
+    tracks = tracker.track(pairs, found.frames.where, Settings())
+    return with_tracks(found, rig.header(rectification, "OpenCV"), tracks)
+
+
+def mean_length(tracks: Tracks) -> float:
+    """Returns the pairs a track was seen in."""
     lengths = np.bincount(tracks.id)
-    return made.with_truth(truth.t_ns, truth.poses), float(lengths[lengths > 0].mean())
+    return float(lengths[lengths > 0].mean())
 
 
 def later(drive: Recording, first: int) -> Recording:
@@ -140,6 +172,7 @@ def main() -> int:
     """Prints the table."""
     parser = judge.parser_of(__doc__, "unused")
     parser.add_argument("--starts", type=int, default=10)
+    parser.add_argument("--convert", action="store_true", help="the tracks of convert, too")
     parser.add_argument("--opencv", action="store_true", help="its tracker, too")
     given = parser.parse_args()
     folder = judge.DATA / FOLDER
@@ -153,10 +186,12 @@ def main() -> int:
         name = f"{752 // times} x {480 // times}, {points} points"
         drive, length = followed(found, times, points)
         tell(name, drive, given.starts, program, length)
-    if given.opencv:
+    if given.convert:
         drive = streams.recording(found)
-        lengths = np.bincount(drive.tracks.id)
-        tell("752 x 480, OpenCV", drive, given.starts, program, float(lengths.mean()))
+        tell("752 x 480, convert", drive, given.starts, program, mean_length(drive.tracks))
+    if given.opencv:
+        drive = by_opencv(found)
+        tell("752 x 480, OpenCV", drive, given.starts, program, mean_length(drive.tracks))
     return 0
 
 

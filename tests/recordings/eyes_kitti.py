@@ -4,7 +4,8 @@
 usage: eyes_kitti.py [--bin build/bin] [--draws 20] [--points 120]
 
 Each draw has its own noise of the twists, 0.5 m/s and 0.05 rad/s, as tests/python/test_track.py has
-them; it also tells the eyes what to expect. Settings of tools/config/track.conf.
+them; it also tells the eyes what to expect. "alone": the tracks of `pelorus track`, whose motion is
+expected to go on as the pictures showed it. Settings of tools/config/track.conf.
 
 err0        m, as `pelorus evaluate` has it: median, mean and worst of the draws
 NEES/6      median; 1 is expected
@@ -29,11 +30,16 @@ from pelorus.math import se3
 from pelorus.math.se3 import Poses
 from pelorus.tracker import Tracker
 from pelorus.tracking import images
-from pelorus.tracking.settings import Settings
-from pelorus.tracking.tracker import track
+from pelorus.tracking.eyes import Eyes, Shown
+from pelorus.tracking.eyes import track as track_alone
 from pelorus.wire.frames import Camera, Report, TwistTiming
 from pelorus_course import matlab
 from scipy.spatial.transform import Rotation
+
+sys.path.insert(0, str(judge.ROOT / "tests/python"))
+
+from opencv_tracker.settings import Settings
+from opencv_tracker.tracker import track
 
 FOLDER = "images/kitti-06-start"
 DRIVE = "klt/2011_09_30_drive_0020_sync_KLT.mat"
@@ -119,13 +125,17 @@ def main() -> int:
     sides = folder / "image_l", folder / "image_r"
     pairs = [images.read(pair) for pair in images.pairs(*sides)]
     judged = track(pairs, sides, Settings(corners=given.points))
-    rows: dict[str, list[list[float]]] = {"eyes": [], "OpenCV": []}
+    height, width = pairs[0][0].shape
+    timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
+    alone = track_alone(timed, Eyes(None, (width, height), corners=given.points), sides)
+    rows: dict[str, list[list[float]]] = {"eyes": [], "alone": [], "OpenCV": []}
     told = ""
     for drive in drives(folder, given.draws):
         own = replace(drive, tracks=followed(drive, pairs, given.points))
         told = told or thirds(program, own)
         plain = replace(own, tracks=replace(own.tracks, sigma_px=None))
-        for name, one in (("eyes", plain), ("OpenCV", replace(drive, tracks=judged))):
+        others = (replace(drive, tracks=tracks) for tracks in (alone, judged))
+        for name, one in zip(rows, (plain, *others), strict=True):
             found = run(program, one)[0]
             rows[name].append([found["err0"], found["NEES/6"]])
     print(f"{'':8}{'err0':>7}{'mean':>7}{'worst':>7}{'NEES/6':>8}")

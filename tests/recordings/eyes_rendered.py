@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Eyes (src/vision) on the rendered drive of docs/images/hero.py, where the truth is exact.
 
-usage: eyes_rendered.py [--draws 4] [--first 3] [--only TEXT] [--opencv] [--points 100]
-                        [--shutter-ms 20]
+usage: eyes_rendered.py [--draws 4] [--first 3] [--only TEXT] [--alone] [--opencv]
+                        [--points 100] [--shutter-ms 20]
 
 Its pictures are rendered once into build/hero and build/hero-rolling-20, some ten minutes in all.
 Each draw has its own noise of the odometry, which also tells the eyes what to expect, and how the
@@ -42,10 +42,12 @@ from pelorus.wire.layout import Floats
 from scipy.spatial.transform import Rotation
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "docs/images"))
+sys.path += [str(ROOT / "docs/images"), str(ROOT / "tests/python")]
 
 import hero  # type: ignore[import-not-found]  # noqa: E402 - its folder is no package
 import street  # type: ignore[import-not-found]  # noqa: E402
+from opencv_tracker.settings import Settings  # noqa: E402
+from opencv_tracker.tracker import track  # noqa: E402
 
 Gray = NDArray[np.uint8]
 Pair = tuple[Gray, Gray]
@@ -204,6 +206,7 @@ def main() -> int:
     parser.add_argument("--shutter-ms", type=int, default=20, help="of the rolling shutter")
     parser.add_argument("--points", type=int, default=100)
     parser.add_argument("--only", default="", help="variants whose names have this text")
+    parser.add_argument("--alone", action="store_true", help="as pelorus track has them, too")
     parser.add_argument("--opencv", action="store_true", help="its tracks of the pictures, too")
     given = parser.parse_args()
     cv2.setNumThreads(1)
@@ -225,8 +228,12 @@ def main() -> int:
         drives = [hero.drive(tracks_of(one), k) for one, k in zip(seen, seeds, strict=True)]
         sights = of_sights(seen[0]) if name == "as it is" else ""
         print(f"{name:12}{of_drives(drives)}{sights}", flush=True)
+        if given.alone:
+            alone = hero.followed(pairs)
+            drives = [hero.drive(alone, seed) for seed in seeds]
+            print(f"{'  alone':12}{of_drives(drives)}", flush=True)
         if given.opencv:
-            tracks = hero.track(pairs, (kept, kept), hero.Settings())
+            tracks = track(pairs, (kept, kept), Settings())
             drives = [hero.drive(tracks, seed) for seed in seeds]
             print(f"{'  OpenCV':12}{of_drives(drives)}", flush=True)
     return 0

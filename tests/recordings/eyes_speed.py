@@ -5,7 +5,8 @@ usage: eyes_speed.py [--rounds 20] [--pairs 20] [--points 100]
 
 The first pairs of EuRoC MH_01, 752 x 480; the gyro tells eyes what to expect. OpenCV's calls go to
 its C++: corners of each left picture, Lucas-Kanade from the last left picture to this one, and from
-left to right, with the window, levels and quality of `pelorus track`; nothing is checked back.
+left to right, with the window, levels and quality of the tests' tracker by OpenCV; nothing is
+checked back.
 Both run in turn, in rounds; of each pair the least time of this thread counts, ms, mean over the
 pairs behind the first, which gives birth to all tracks.
 """
@@ -19,11 +20,11 @@ from typing import Any
 import cv2
 import judge
 import numpy as np
+from opencv_tracker.matching import LEVELS, QUALITY  # eyes has named the folder
+from opencv_tracker.settings import Settings
 from pelorus.converters import euroc
 from pelorus.converters.streams import Asked, Pictures, Readings
 from pelorus.tracker import Tracker
-from pelorus.tracking.matching import LEVELS, QUALITY
-from pelorus.tracking.settings import Settings
 from pelorus.wire.layout import Floats
 
 import eyes

@@ -13,6 +13,7 @@ Pictures need not be rectified: observations are those of a virtual rectified ca
 
 from __future__ import annotations
 
+import copy
 import ctypes as c
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -100,10 +101,9 @@ class Tracker:
     ) -> None:
         """Makes a tracker; `camera` is the virtual camera, by default the library's choice."""
         self._library = vision.library(precision)
-        most = c.c_uint32()
-        self.pixels_max = self._library.binding_vision_limits(c.byref(most))
-        if not 1 <= tracks <= most.value:
-            raise PelorusError(f"tracks: {tracks}; 1 to {most.value} are possible")
+        most = vision.limits(precision).tracks
+        if not 1 <= tracks <= most:
+            raise PelorusError(f"tracks: {tracks}; 1 to {most} are possible")
         for name, value, limit in (
             ("row_time_s", row_time_s, 1e-3), ("disparity_max_px", disparity_max_px, 4096)
         ):  # fmt: skip
@@ -162,6 +162,12 @@ class Tracker:
         R, p = np.array(told.T_CB.R).reshape(3, 3), np.array(told.T_CB.p)
         five = (told.fx_px, told.fy_px, told.cx_px, told.cy_px, told.baseline_m)
         return Calibration(*five, R, p)
+
+    def copy(self) -> Self:
+        """Returns another tracker with the same tracks, to try what a pair shows."""
+        other = copy.copy(self)
+        other._memory = type(self._memory).from_buffer_copy(self._memory)
+        return other
 
     def forget(self) -> None:
         """Drops all tracks, as after a cut in the recording."""
@@ -229,8 +235,13 @@ def _copied(address: int | None, count: int, kind: np.dtype[np.void]) -> NDArray
     return np.frombuffer(c.string_at(address, count * kind.itemsize), kind).copy()
 
 
+def is_followed(*lenses: Lens) -> bool:
+    """Returns whether pictures of these lenses are followed as they are."""
+    return all(one.model in MODELS and len(one.coefficients) <= COEFFICIENTS_MAX for one in lenses)
+
+
 def _lens(lens: Lens) -> vision.Lens:
-    if lens.model not in MODELS or len(lens.coefficients) > COEFFICIENTS_MAX:
+    if not is_followed(lens):
         known = "none, radtan (4, 5 or 8 numbers) and equidistant"
         raise PelorusError(
             f"a lens {lens.model} with {len(lens.coefficients)} numbers: {known} are followed as "

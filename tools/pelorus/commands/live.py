@@ -19,7 +19,6 @@ from pelorus.commands.watching import VIEW, watching
 from pelorus.errors import Existing, PelorusError
 from pelorus.live.camera import CAMERAS, Asked, Camera, open_camera
 from pelorus.live.port import FORMS
-from pelorus.online.choice import Kind
 from pelorus.online.diagnosis import Level, Status
 from pelorus.program.console import err, out, told
 
@@ -90,9 +89,6 @@ def live(
         help="For v4l2: a serial port that gives lines `ax ay az wx wy wz` in m/s^2 and rad/s, or "
         "with a time in s before them.",
     ),
-    eyes: Kind = typer.Option(
-        "own", help="What follows the pictures: as on a controller, or OpenCV's, ten times slower."
-    ),
     wheels: str = typer.Option(
         "",
         metavar="udp:PORT|FILE.csv",
@@ -149,7 +145,7 @@ def live(
             for remark in opened.remarks:
                 out.print(escape(remark))
             own = getattr(opened, "settings", {})
-            how = How(mount, eyes=eyes, settings=own | given, log=log, watch=watch)
+            how = How(mount, settings=own | given, log=log, watch=watch)
             _drive(Session(opened, how), opened, outputs, seconds)
         if check and log is not None:
             raise typer.Exit(_verdict(log))

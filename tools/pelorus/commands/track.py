@@ -14,12 +14,11 @@ from pelorus.errors import PelorusError, resolved
 from pelorus.io.tracks import Tracks
 from pelorus.program.console import out, progress
 from pelorus.tracking import images, output, sheet
+from pelorus.tracking.eyes import CORNERS, Eyes, Shown
+from pelorus.tracking.eyes import track as track_all
 from pelorus.tracking.images import Gray, Pair
 from pelorus.tracking.row_gaps import TOLD_ABOVE_PX, row_gaps
-from pelorus.tracking.settings import Settings
-from pelorus.tracking.tracker import track as track_all
 
-USUAL = Settings()
 EXAMPLE = "pelorus track image_l image_r stereo.csv --rate 10 --sheet tracks.png"
 
 app = typer.Typer()
@@ -46,40 +45,16 @@ def track(
     sheet_file: Path | None = typer.Option(
         None, "--sheet", metavar="OUT.png", help="Some frames with their tracks, to look at."
     ),
-    corners: int = typer.Option(USUAL.corners, help="At most so many tracks in a frame."),
-    spacing: float = typer.Option(
-        USUAL.spacing_px, metavar="PX", help="Least distance of a new corner from all others."
-    ),
-    window: int = typer.Option(
-        USUAL.window_px, metavar="PX", help="Side of the patch that is followed; odd."
-    ),
-    round_trip: float = typer.Option(
-        USUAL.round_trip_px,
-        metavar="PX",
-        help="Followed there and back, a point may miss its start by so much.",
-    ),
-    row_gap: float = typer.Option(
-        USUAL.row_gap_px, metavar="PX", help="Largest |vL - vR| of a match."
-    ),
-    epipolar: float = typer.Option(
-        USUAL.epipolar_px,
-        metavar="PX",
-        help="How far a point may lie off the motion that the others agree on (RANSAC).",
-    ),
+    corners: int = typer.Option(CORNERS, help="At most so many tracks in a frame."),
     disparity_max: int = typer.Option(
-        USUAL.disparity_max_px,
-        metavar="PX",
-        help="Largest uL - uR; 0 is an eighth of the picture's width.",
+        0, metavar="PX", help="Largest uL - uR; 0 is a sixth of the picture's width."
     ),
 ) -> None:
     """Follow points through rectified stereo pictures (PNG, JPEG, PGM, BMP, TIFF).
 
-    Corners are spread over the picture, followed there and back, kept where RANSAC agrees, found
-    anew by the patch of their birth, and matched along the row; a track is written if it lived for
-    three frames at least.
+    By the tracker that the robot runs (docs/EYES.md). A track is written if it was seen in three
+    frames at least.
     """
-    settings = Settings(corners, spacing, window, round_trip, row_gap, epipolar, disparity_max)
-    settings.check()
     if times is not None and rate is not None:
         raise typer.BadParameter("one of them, not both", param_hint="--times / --rate")
     _require_places(target, sheet_file)
@@ -90,7 +65,11 @@ def track(
     bits = images.bits_of(pairs, remarks)
     for remark in remarks:
         out.print(escape(remark))
-    tracks = track_all(_read(pairs, bits, shown), (left, right), settings)
+    first, _ = images.read(pairs[0], bits=bits)
+    size = first.shape[1], first.shape[0]
+    eyes = Eyes(None, size, corners=corners, disparity_max_px=disparity_max)
+    shown_pairs = zip(t_ns.tolist(), _read(pairs, bits, shown), strict=True)
+    tracks = track_all((Shown(t, *pair) for t, pair in shown_pairs), eyes, (left, right))
     files = {target: output.csv_text(t_ns, tracks).encode()}
     if sheet_file is not None:
         files[sheet_file] = sheet.sheet(shown, [pair.left.name for pair in pairs], tracks)

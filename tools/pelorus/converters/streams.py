@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.converters import earth_start, full_scale, repeated, twist_noise
+from pelorus.converters.expected import Expected
 from pelorus.errors import PelorusError
 from pelorus.faults import resolution, stale
 from pelorus.faults.finding import Finding
@@ -28,14 +29,14 @@ from pelorus.io.tracks import Tracks
 from pelorus.io.trajectory import Trajectory, filled
 from pelorus.math.inertial import NO_READINGS, Inertial
 from pelorus.math.motion import Times
+from pelorus.math.se3 import Poses
 from pelorus.program.console import progress
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray, Rectification
 from pelorus.rig.rig import Rig
 from pelorus.tracking import images
-from pelorus.tracking.settings import Settings
-from pelorus.tracking.tracker import track
+from pelorus.tracking.eyes import Eyes, Shown, track
 from pelorus.wire.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
 from pelorus.wire.layout import Floats
 
@@ -145,12 +146,12 @@ class Streams:
         return [*self.remarks, *of_truth, *self.calibrated.remarks]
 
 
-def recording(streams: Streams, settings: Settings | None = None) -> Recording:
-    """Makes a recording; `settings` are those of the tracker."""
-    return _made(streams, settings)[0]
+def recording(streams: Streams) -> Recording:
+    """Makes a recording."""
+    return _made(streams)[0]
 
 
-def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[Finding]]:
+def _made(streams: Streams) -> tuple[Recording, list[Finding]]:
     """Returns the recording, and what was found in making it."""
     calibrated, frames = streams.calibrated, streams.frames
     t_ns = frames.t_ns
@@ -160,7 +161,7 @@ def _made(streams: Streams, settings: Settings | None) -> tuple[Recording, list[
     truth = None if streams.truth is None else at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
         repeats = repeated.Repeats(_moves(streams.motion, t_ns), t_ns)
-        header, tracks = _tracked(frames, calibrated, settings or Settings(), repeats)
+        header, tracks = _tracked(streams, frames, t_ns, repeats)
         t_ns = repeats.kept_t_ns
         found = repeats.findings
     else:
@@ -203,7 +204,7 @@ def converted(
     `timing` overrides the calibration's. Without all six velocities only the tracks can be judged.
     A drive by an IMU is judged, not mended.
     """
-    made, placed = _made(found, None)
+    made, placed = _made(found)
     if timing is not None:
         made = made.with_header(twist_timing=timing)
     if found.on_earth and found.truth is None:
@@ -429,10 +430,20 @@ def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tr
     return replace(tracks, pixels=pixels).at(np.nonzero(good)[0])
 
 
+def _expected(streams: Streams, header: Header, t_ns: Times) -> Expected:
+    """Returns how points of pictures of these times are expected to have moved."""
+    T_CB, motion = Poses(header.R_CB, header.t_CB_m), streams.motion
+    if isinstance(motion, Twists):
+        moved = motion.t_ns, motion.v_B_mps, motion.w_B_radps
+        return Expected.by_twists(t_ns, T_CB, moved, motion.measured, header.twist_timing)
+    return Expected.by_gyro(t_ns, T_CB, streams.calibrated.imu.correction.of(motion.inertial))
+
+
 def _tracked(
-    pictures: Pictures, calibrated: Calibrated, settings: Settings, repeats: repeated.Repeats
+    streams: Streams, pictures: Pictures, t_ns: Times, repeats: repeated.Repeats
 ) -> tuple[Header, Tracks]:
     """Returns the HEADER of the rectified pictures, and the tracks in them."""
+    calibrated = streams.calibrated
     pairs = pictures.read()
     first = next(pairs)
     height, width = first[0].shape
@@ -440,24 +451,24 @@ def _tracked(
     sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
     if (width, height) not in sizes:
         images.require_size(pictures.where[0], first[0].shape, sizes[0])
-    show = None
     if rig is not None:
-        whole = rig.of_size(width, height)
-        rectification = whole.rectification()
-        header, show = whole.header(rectification, header.name), rectification.pictures
+        rig = rig.of_size(width, height)
+        header = rig.header(rig.rectification(), header.name)
     header = replace(header, image_width_px=width, image_height_px=height)
 
-    def shown() -> Iterator[tuple[Gray, Gray]]:
-        for pair in chain((first,), pairs):
+    def shown() -> Iterator[Shown]:
+        last = None
+        for k, pair in enumerate(chain((first,), pairs)):
             for where, picture in zip(pictures.where, pair, strict=True):
                 images.require_alike(where, picture, first[0])
-            if repeats.leaves_out(*pair):
-                continue
-            yield pair if show is None else show(*pair)
+            if not repeats.leaves_out(*pair):
+                motion = None if last is None else expected.between(last, k)
+                yield Shown(int(t_ns[k]), *pair, motion)
+                last = k
 
-    return header, track(
-        progress(shown(), "tracking", len(pictures.t_ns)), pictures.where, settings
-    )
+    expected = _expected(streams, header, t_ns)
+    eyes = Eyes(header.camera, (width, height), rig)
+    return header, track(progress(shown(), "tracking", len(pictures.t_ns)), eyes, pictures.where)
 
 
 # --- truth ----------------------------------------------------------------------------------------

@@ -16,12 +16,11 @@ from pelorus.math.se3 import Poses
 from pelorus.native.binding import Precision
 from pelorus.native.configured import Named
 from pelorus.online import diagnosis
-from pelorus.online.choice import Kind
 from pelorus.online.diagnosis import Level, Status
 from pelorus.online.drive import Setup
-from pelorus.online.eyes import Seen
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline, header_of
+from pelorus.tracking.eyes import Seen
 from pelorus.wire.frames import Header, Imu, Message, Stereo
 
 REMEDY_FOR_G = f"multiply its readings by {G_MPS2:g}"
@@ -47,7 +46,6 @@ class How:
 
     mount: tuple[float, ...] = HERE
     within_ms: float = 2.0
-    eyes: Kind = "own"
     settings: Named = field(default_factory=dict)
     precision: Precision = "float32"
     log: Path | None = None
@@ -59,7 +57,7 @@ class Session:
 
     def __init__(self, camera: Camera, how: How) -> None:
         self.camera = camera
-        self.pipeline = Pipeline(round(how.within_ms * 1e6), REMEDY_FOR_G, how.eyes)
+        self.pipeline = Pipeline(round(how.within_ms * 1e6), REMEDY_FOR_G)
         header = header_of(camera.calibrated, camera.inertial)
         self.pipeline.calibrated = replace(camera.calibrated, header=header)
         setup = Setup(header, how.settings, how.precision)
@@ -112,7 +110,6 @@ class Session:
         """Returns what there is to say, the worst first; nothing where all is good."""
         found = [Status(name, Level.ERROR, words) for name, words in self.pipeline.blocked.items()]
         found += diagnosis.of_pairs(self.pipeline.pairing)
-        found += diagnosis.of_eyes(self.pipeline.not_own)
         found += diagnosis.of_halves(self.pipeline.together)
         found += diagnosis.of_speed(self.too_slow)
         found += diagnosis.of_odometry(self.odometry, self.pipeline.last, self.messages)

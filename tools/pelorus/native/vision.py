@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ctypes as c
 from functools import cache
-from typing import Any, Protocol, cast
+from typing import Any, NamedTuple, Protocol, cast
 
 from pelorus.errors import PelorusError
 from pelorus.native import binding
@@ -176,3 +176,16 @@ def library(precision: Precision = "float32") -> VisionLibrary:
             f"the library has another {', '.join(differ)}: build it anew, or install both together"
         )
     return cast(VisionLibrary, found)
+
+
+class Limits(NamedTuple):
+    """Most pixels of a picture, and most points that are followed."""
+
+    pixels: int
+    tracks: int
+
+
+def limits(precision: Precision = "float32") -> Limits:
+    """Returns those with which the library was built."""
+    tracks = c.c_uint32()
+    return Limits(library(precision).binding_vision_limits(c.byref(tracks)), tracks.value)

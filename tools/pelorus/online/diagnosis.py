@@ -112,15 +112,6 @@ def of_pairs(pairing: Pairing[Any]) -> list[Status]:
     return [Status("sync", Level.WARN if paired else Level.ERROR, words, do)]
 
 
-def of_eyes(not_own: str) -> list[Status]:
-    """Returns whether another tracker than the one that was asked for follows the pictures."""
-    if not not_own:
-        return []
-    words = f"OpenCV's tracker follows the pictures, which takes longer: {not_own}"
-    do = "rectify the pictures, or make them smaller, with their calibration; or ask for opencv"
-    return [Status("eyes", Level.WARN, words, do)]
-
-
 def of_halves(together: Together | None) -> list[Status]:
     """Returns whether the two pictures of a pair are taken together, by their rows."""
     if together is None or together.found is None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,13 @@ from pelorus.evaluate.health import DEGRADED, LOST
 from pelorus.faults.sync import PictureDelay
 from pelorus.math.inertial import Inertial
 from pelorus.math.se3 import Poses
-from pelorus.online.choice import Kind
 from pelorus.online.expected import ExpectedMotion, Velocity, known_velocity
-from pelorus.online.eyes import Eyes, Seen, open_eyes, require_size
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.order import Datum
 from pelorus.online.pairs import Joining, Pairing
 from pelorus.online.together import Together
 from pelorus.rig.read import Calibrated
+from pelorus.tracking.eyes import Eyes, Seen
 from pelorus.tracking.images import Gray
 from pelorus.wire.frames import Header, Imu, Process, Stereo, Twist
 from pelorus.wire.layout import Floats
@@ -35,6 +35,7 @@ WINDOW = 50  # readings by whose median the unit is judged
 WINDOWS_ENOUGH = 4
 POINTS_ENOUGH = 10  # to tell by their disparities that the cameras are swapped
 G_MPS2 = 9.80665
+FIRST_LOOK = 4  # a look takes 60 ms, and the first pairs wait while the rest is made ready
 CAMERAS, IMU = "cameras", "imu"
 
 
@@ -47,6 +48,26 @@ def header_of(calibrated: Calibrated, inertial: bool, size: tuple[int, int] = (0
     if size[0] and not header.image_width_px:
         header = replace(header, image_width_px=size[0], image_height_px=size[1])
     return header
+
+
+def eyes_of(calibrated: Calibrated, left: Gray) -> Eyes:
+    """Returns what follows pictures of this size."""
+    rows, columns = left.shape
+    rig = calibrated.rig
+    if rig is not None:
+        rig = rig.of_size(columns, rows)
+    return Eyes(calibrated.header.camera, (columns, rows), rig, first_look=FIRST_LOOK)
+
+
+def require_size(left: Gray, right: Gray, width_px: int, height_px: int) -> None:
+    """Raises PelorusError where pictures are not as large as the calibration says."""
+    for name, picture in (("left", left), ("right", right)):
+        rows, columns = picture.shape
+        if width_px and (columns, rows) != (width_px, height_px):
+            raise PelorusError(
+                f"the {name} pictures have {columns} x {rows} pixels, the calibration is of "
+                f"{width_px} x {height_px}: give the one of these pictures"
+            )
 
 
 @dataclass
@@ -77,12 +98,11 @@ class UnitCheck:
 
 
 class Pipeline:
-    """`blocked` says why nothing is told although data come: what was found cannot be right.
-    `not_own` says why OpenCV's tracker follows the pictures where own eyes were asked for."""
+    """`blocked` says why nothing is told although data come: what was found cannot be right."""
 
-    def __init__(self, within_ns: int, remedy_for_g: str, eyes: Kind = "own") -> None:
+    def __init__(self, within_ns: int, remedy_for_g: str) -> None:
         """`within_ns`: pictures whose stamps differ by so much at most belong together."""
-        self.within_ns, self._remedy, self._kind = within_ns, remedy_for_g, eyes
+        self.within_ns, self._remedy = within_ns, remedy_for_g
         self.calibrated: Calibrated | None = None
         self.odometry: Odometry | None = None
         self.last: Odom | None = None
@@ -91,7 +111,6 @@ class Pipeline:
     def begin(self) -> None:
         """Forgets what the sensors have shown; the odometry goes on."""
         self.blocked: dict[str, str] = {}
-        self.not_own = ""
         self.pairing: Pairing[Any] = Pairing(self.within_ns)
         self.joining = Joining()
         self._unit = UnitCheck(self._remedy)
@@ -109,10 +128,11 @@ class Pipeline:
         header = self.calibrated.header
         require_size(left, right, header.image_width_px, header.image_height_px)
         if self._eyes is None:
-            self._eyes, self.not_own = open_eyes(self.calibrated, self._kind)
+            self._eyes = eyes_of(self.calibrated, left)
         motion = self._motion().until(t_ns + self._offset_ns)
         try:
             seen = self._eyes.see(t_ns, left, right, motion)
+            self._eyes.require_rectified((Path("left"), Path("right")))
         except PelorusError as error:
             self.blocked[CAMERAS] = str(error)
             return []

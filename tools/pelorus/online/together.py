@@ -9,7 +9,7 @@ import numpy as np
 
 from pelorus.faults.sync import PictureDelay, apart
 from pelorus.io.tracks import Tracks
-from pelorus.online.eyes import Seen
+from pelorus.tracking.eyes import Seen
 from pelorus.wire.frames import Camera
 
 FRAMES, EVERY = 40, 20  # looked at together, and so often

@@ -12,19 +12,27 @@ camera's it asks for the same ones again in every frame.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 from pelorus.program.extras import cv2
-from pelorus.tracking import matching
 from pelorus.tracking.images import Gray
-from pelorus.tracking.settings import Settings
 
 CORNERS = 40  # of a picture
-HALF = matching.PATCH_HALF_PX
+QUALITY = 0.01  # of the strongest corner: in the shade too there shall be some
+CORNERS_APART_PX = 20.0
+CELLS_ACROSS, CELLS_DOWN = 12, 4  # over which the corners are spread
+HALF = 7  # of a patch, px
+LIKENESS_MIN = 0.8  # normalised correlation
+UNIQUE_RATIO = 0.9  # the second best place may be so much like the best
+ROW_GAP_PX = 1.5  # of a point in a rectified pair
+LEFT_PX = 3  # so much further right a far point may be
+REACH_SHARE = 8  # of the width: the largest disparity that is searched
 ROWS_PX = 32  # up and down; a point of a pair that is nearly rectified is within
 SIGMAS = 3.0
 CHANCE = 1.3e-3  # as far off as three sigma, on one side
@@ -42,14 +50,14 @@ class Seen:
     def elsewhere(self) -> int:
         return len(self.rows_off_px)
 
-    def count(self, found: tuple[int, int] | None, row_gap_px: float) -> None:
+    def count(self, found: tuple[int, int] | None) -> None:
         """A corner, `found` so much further right and lower; None: nowhere for sure."""
         if found is None:
             return
         right_px, lower_px = found
-        if abs(lower_px) > row_gap_px:
+        if abs(lower_px) > ROW_GAP_PX:
             self.rows_off_px.append(lower_px)
-        elif right_px <= matching.SEARCH_LEFT_PX:
+        elif right_px <= LEFT_PX:
             self.as_due += 1
         else:
             self.swapped += 1
@@ -60,7 +68,7 @@ class Evidence:
     """Of some frames, each of twice the number of the one before, for a scene may stand still; the
     number of the `first` is a power of two."""
 
-    settings: Settings
+    disparity_max_px: int = 0  # 0: a share of the width
     first: int = 1
     corners: int = 0
     seen: Seen = field(default_factory=Seen)
@@ -92,16 +100,15 @@ class Evidence:
     def _look(self, before: Gray, left: Gray, right: Gray) -> None:
         mirrored = np.ascontiguousarray(np.flipud(right))
         rows, columns = left.shape
-        gap_px, reach = self.settings.row_gap_px, matching.disparity_max(left, self.settings)
-        self._share = (2 * int(gap_px) + 1) / (2 * ROWS_PX + 1) * 0.5
-        few = replace(self.settings, corners=CORNERS)
-        for u, v in np.round(matching.new_corners(left, matching.none(), few)).astype(int).tolist():
+        reach = self.disparity_max_px or columns // REACH_SHARE
+        self._share = (2 * int(ROW_GAP_PX) + 1) / (2 * ROWS_PX + 1) * 0.5
+        for u, v in np.round(_corners(left)).astype(int).tolist():
             inside = HALF <= u < columns - HALF and HALF <= v < rows - HALF
             if not inside or not all(_most_alike(left, p, (u, v), reach) for p in (left, before)):
                 continue
             self.corners += 1
             for picture, counts in ((right, self.seen), (mirrored, self.chance)):
-                counts.count(_most_alike(left, picture, (u, v), reach), gap_px)
+                counts.count(_most_alike(left, picture, (u, v), reach))
 
     def require_rectified(self, where: tuple[Path, Path]) -> None:
         """PelorusError where another relation of the two cameras explains what is seen."""
@@ -130,6 +137,22 @@ class Evidence:
             )
 
 
+def _corners(image: Gray) -> NDArray[np.float32]:
+    """Returns (n, 2) the strongest corners, those of each cell of a grid in turn."""
+    inner = np.zeros_like(image)
+    inner[HALF:-HALF, HALF:-HALF] = 255
+    found: Any = cv2.goodFeaturesToTrack(image, 0, QUALITY, CORNERS_APART_PX, mask=inner)
+    if found is None:  # there is none
+        return np.empty((0, 2), np.float32)
+    corners = np.asarray(found, np.float32).reshape(-1, 2)
+    rows, columns = image.shape
+    share = corners / [columns, rows] * [CELLS_ACROSS, CELLS_DOWN]
+    across, down = np.minimum(share.astype(int), [CELLS_ACROSS - 1, CELLS_DOWN - 1]).T
+    cell = (down * CELLS_ACROSS + across).tolist()
+    place = [cell[:k].count(one) for k, one in enumerate(cell)]
+    return corners[np.sort(np.argsort(place, kind="stable")[:CORNERS])]
+
+
 def _most_alike(left: Gray, other: Gray, at: tuple[int, int], reach: int) -> tuple[int, int] | None:
     """By how much further right and lower the other picture shows what the left one has there;
     None where it does not, or in more places than one.
@@ -142,7 +165,7 @@ def _most_alike(left: Gray, other: Gray, at: tuple[int, int], reach: int) -> tup
     row, column = divmod(int(likeness.argmax()), likeness.shape[1])
     best, near = float(likeness[row, column]), HALF // 2
     likeness[max(row - near, 0) : row + near + 1, max(column - near, 0) : column + near + 1] = -1
-    if best < matching.LIKENESS_MIN or likeness.max() > matching.UNIQUE_RATIO * best:
+    if best < LIKENESS_MIN or likeness.max() > UNIQUE_RATIO * best:
         return None
     return first + column + HALF - u, top + row + HALF - v
 

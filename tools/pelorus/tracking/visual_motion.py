@@ -7,6 +7,7 @@ of Geman and McClure (1987) against bad matches; all frames at once.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -94,11 +95,23 @@ def estimate(seen: SeenPairs, camera: Camera, first: Poses | None = None) -> Pos
     """
     at_rest = Poses(np.tile(np.eye(3), (seen.frame_count, 1, 1)), np.zeros((seen.frame_count, 3)))
     motion = at_rest if first is None else first
-    for iteration in progress(range(ITERATIONS), "camera motion", ITERATIONS):
+    return _searched(seen, camera, motion, progress(range(ITERATIONS), "camera motion", ITERATIONS))
+
+
+def _searched(seen: SeenPairs, camera: Camera, motion: Poses, steps: Iterable[int]) -> Poses:
+    for iteration in steps:
         scale_px = WIDE_PX if iteration < WIDE_ITERATIONS else NARROW_PX
         step = se3.exp(*_gauss_newton(seen, camera, motion, scale_px))
         motion = se3.compose(step, motion)
     return Poses(se3.nearest_rotation(motion.R), motion.p)
+
+
+def of_pair(tracks: Tracks, camera: Camera) -> Poses | None:
+    """Returns the motion between the only two frames of these tracks; None with too few pairs."""
+    seen = seen_pairs(tracks, camera, 1)
+    if len(seen.frame) < PAIRS_MIN:
+        return None
+    return _searched(seen, camera, rigid(seen, camera), range(ITERATIONS)).at(0)
 
 
 def rigid(seen: SeenPairs, camera: Camera) -> Poses:

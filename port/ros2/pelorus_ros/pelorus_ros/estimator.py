@@ -19,12 +19,11 @@ from pelorus.converters import ros_frames
 from pelorus.errors import PelorusError, write_text
 from pelorus.io.known_map import known_map
 from pelorus.online import diagnosis
-from pelorus.online.choice import Kind
 from pelorus.online.diagnosis import Status
 from pelorus.online.drive import Setup
-from pelorus.online.eyes import Seen
 from pelorus.online.odometry import Given, Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline
+from pelorus.tracking.eyes import Seen
 from pelorus.wire import schema
 from pelorus.wire.frames import Imu, Reading, Twist
 from pelorus.wire.layout import Floats
@@ -60,9 +59,8 @@ class Estimator:
         self.options = options
         self.rigging = Rigging(options)
         within_ns = round(options.sync_matching_threshold_ms * 1e6)
-        eyes: Kind = "opencv" if options.eyes == "opencv" else "own"
         remedy = f"set the parameter accel_scale to {G_MPS2:g}"
-        self.pipeline = Pipeline(within_ns, remedy, eyes)
+        self.pipeline = Pipeline(within_ns, remedy)
         self.waits_for = "for the first data"
         self.counts: Counter[str] = Counter()  # messages used, by topic; what was left out
         self.faults: dict[str, str] = {}  # of messages that could not be read, by topic
@@ -345,7 +343,6 @@ class Estimator:
             status.of_setup(self.blocked, self.waits_for),
             *status.of_inputs(self.topics(), fresh, self.counts, faults),
             *diagnosis.of_pairs(self.pipeline.pairing),
-            *diagnosis.of_eyes(self.pipeline.not_own),
             *diagnosis.of_halves(self.pipeline.together),
             *diagnosis.of_speed(fresh["too slow"]),
             *diagnosis.of_odometry(self.odometry, self.pipeline.last, self._messages()),

@@ -12,7 +12,6 @@ from typing import Any, Self
 from pelorus.errors import PelorusError
 from pelorus.native.binding import Precision, library
 from pelorus.native.configured import Configured
-from pelorus.online.choice import KINDS
 
 MOTIONS = ("imu", "gyro_accel", "wheels")
 TRANSPORTS = ("raw", "compressed")
@@ -68,11 +67,6 @@ class Options:
     )
     tracks_type: str = parameter(
         "", "type of the topic tracks; empty: pictures are followed here", ("", *TRACKS)
-    )
-    eyes: str = parameter(
-        "own",
-        "what follows the pictures: own, as on a controller, or opencv, some ten times slower",
-        KINDS,
     )
     calibration: list[str] = parameter(
         [""], "calibration files of any kind that `pelorus convert` reads; empty: camera_info"

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
 from pelorus.program.extras import cv2
 from pelorus.tracking.images import Gray
-from pelorus.tracking.settings import Settings
+
+from opencv_tracker.settings import Settings
 
 Points = NDArray[np.float32]
 Mask = NDArray[np.bool_]

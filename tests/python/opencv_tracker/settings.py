@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `pelorus track` lets a user choose, with defaults that work on a car and on a hand."""
+"""The tracker's settings, with defaults that work on a car and on a hand."""
 
 from __future__ import annotations
 

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
 from pelorus.program.extras import cv2
 from pelorus.tracking.images import Gray
-from pelorus.tracking.matching import Mask, Points
 from pelorus.wire.layout import Floats
+
+from opencv_tracker.matching import Mask, Points
 
 SMOOTH_PX = 0.8  # so that the values between pixels are what their neighbours say
 ITERATIONS = 12

@@ -10,16 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
 from pelorus.errors import PelorusError
 from pelorus.io.tracks import Tracks
-from pelorus.tracking import matching, patches
 from pelorus.tracking.images import PAIRS_MIN, Gray
-from pelorus.tracking.matching import Mask, Points
-from pelorus.tracking.patches import Patches
-from pelorus.tracking.rectified import Evidence
-from pelorus.tracking.settings import Settings
 from pelorus.wire.layout import Floats
+
+from opencv_tracker import matching, patches
+from opencv_tracker.matching import Mask, Points
+from opencv_tracker.patches import Patches
+from opencv_tracker.settings import Settings
 
 ADMITTED_AFTER = PAIRS_MIN  # frames
 LOOP_PX = 1.0  # flow in the right picture and the match from the left one must meet
@@ -128,11 +127,9 @@ def track(
 ) -> Tracks:
     """All of a drive; PelorusError where there is nothing to follow."""
     settings.check()
-    tracker, evidence = Tracker(settings), Evidence(settings)
+    tracker = Tracker(settings)
     for left, right in images:
         tracker.add(left, right)
-        evidence.add(left, right)
-    evidence.require_rectified(where)
     tracks = tracker.tracks()
     if not len(tracks):
         raise PelorusError(
