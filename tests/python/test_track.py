@@ -27,9 +27,8 @@ from pelorus.io.table import Table
 from pelorus.io.tracks import Tracks, triangulate
 from pelorus.io.trajectory import Trajectory
 from pelorus.math import se3
-from pelorus.tracking import images, matching
-from pelorus.tracking.settings import Settings
-from pelorus.tracking.tracker import track
+from pelorus.tracking import images
+from pelorus.tracking.eyes import Eyes, Shown, track
 from pelorus.wire import framing
 from pelorus.wire.frames import Camera, TwistTiming
 from pelorus_course import matlab
@@ -44,7 +43,7 @@ FRAMES, RATE_HZ, SPEED_MPS = 10, 10.0, 2.0
 SIDE, FALL = 70, 5  # px, and px a frame: a thing that falls
 WALL_M, BOARD_M, BOARD_HALF_M = 12.0, 5.0, 1.3  # a board stands before a wall
 DRAWS = 5
-FEW = Settings(corners=60)
+FEW = 60
 
 
 # --- pictures whose points are known --------------------------------------------------------------
@@ -94,8 +93,12 @@ def write(folder: Path, pairs: Frames) -> tuple[Path, Path]:
     return folders
 
 
-def followed(pairs: Frames, settings: Settings = FEW) -> Tracks:
-    return track(pairs, (Path("left"), Path("right")), settings)
+def followed(pairs: Frames, corners: int = FEW) -> Tracks:
+    """Returns the tracks as pelorus track makes them."""
+    height, width = pairs[0][0].shape
+    timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
+    eyes = Eyes(None, (width, height), corners=corners)
+    return track(timed, eyes, (Path("left"), Path("right")))
 
 
 def in_world(tracks: Tracks) -> NDArray[np.float64]:

@@ -52,8 +52,8 @@ def track(
 ) -> None:
     """Follow points through rectified stereo pictures (PNG, JPEG, PGM, BMP, TIFF).
 
-    By the tracker that the robot runs (docs/EYES.md). A track is written if it was seen in three
-    frames at least.
+    By the tracker that the robot runs (docs/EYES.md): the filter admits a track that is seen in
+    three frames; shorter ones are written, too.
     """
     if times is not None and rate is not None:
         raise typer.BadParameter("one of them, not both", param_hint="--times / --rate")

@@ -112,27 +112,26 @@ class Eyes:
     def search(self, t_ns: int, left: Gray, right: Gray, motion: Motion | None) -> Seen:
         """Returns the same where there is time: after several looks at the pair.
 
-        `motion` is not relied upon: where more than twice as many points are found again if the
-        camera moves on as the pictures showed it, it is left out. Where nothing tells the motion,
-        most points found again decide whether it goes on or nothing is expected, and the motion
-        that they show is tried, too.
+        Of a `motion` with p = 0 only the turn is measured; the way goes on as the pictures showed
+        it. `motion` is not relied upon: it is left out where more than twice as many points of the
+        last pair are found again without it. Without it that look counts which finds most: where
+        the motion goes on, where nothing is expected, or where it is what the better one showed.
         """
         shown = self._shown(left, right)
-        tries = [self._look(t_ns, shown, motion)]
         going = self._going.until(t_ns)
+        best = self._look(t_ns, shown, None)
         if going is not None:
-            tries.append(self._look(t_ns, shown, going))
-        if motion is None:
-            best = max(tries, key=lambda one: one.again)
-            shows = self._going.shown_by(best.seen)
-            if shows is not None:
-                tries.append(self._look(t_ns, shown, shows))
-            chosen = max(tries, key=lambda one: one.again)
-        else:
-            chosen = tries[-1] if tries[-1].again > 2 * tries[0].again else tries[0]
-        self._tracker = chosen.tracker
-        self._going.add(t_ns, chosen.seen)
-        return chosen.seen
+            best = max(best, self._look(t_ns, shown, going), key=lambda look: look.again)
+        if motion is not None:
+            if going is not None and not motion[1].any():
+                motion = motion[0], going[1]
+            told = self._look(t_ns, shown, motion)
+            best = best if best.again > 2 * told.again else told
+        elif (shows := self._going.shown_by(best.seen)) is not None:
+            best = max(best, self._look(t_ns, shown, shows), key=lambda look: look.again)
+        self._tracker = best.tracker
+        self._going.add(t_ns, best.seen)
+        return best.seen
 
     def _look(self, t_ns: int, shown: tuple[Gray, Gray], motion: Motion | None) -> _Look:
         tracker = self._tracker.copy()
@@ -220,20 +219,14 @@ def _small(picture: Gray, times: int) -> Gray:
 
 
 def track(pairs: Iterable[Shown], eyes: Eyes, where: tuple[Path, Path]) -> Tracks:
-    """Returns the tracks of a drive.
-
-    Only those that were seen in three pairs, after which the filter admits one. Raises PelorusError
-    where there is nothing to follow.
-    """
+    """Returns the tracks of a drive; raises PelorusError where there is nothing to follow."""
     seen = [eyes.search(*pair) for pair in pairs]
     eyes.require_rectified(where)
     tracks = Tracks.of_frames([one.ids for one in seen], [one.pixels for one in seen])
     _, number, lives = np.unique(tracks.id, return_inverse=True, return_counts=True)
-    lasting = lives >= PAIRS_MIN
-    kept = lasting[number]
-    if not kept.any():
+    if not (lives >= PAIRS_MIN).any():
         raise PelorusError(
             f"{where[0]}: no corner could be followed for {PAIRS_MIN} frames; pictures with "
             "texture that overlap from frame to frame are expected"
         )
-    return tracks.at(kept).with_ids((np.cumsum(lasting) - 1)[number[kept]])
+    return tracks.with_ids(number.astype(np.int64))
