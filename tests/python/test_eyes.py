@@ -4,17 +4,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pelorus import Calibration, FilterError, PelorusError, Tracker
-from pelorus.math.se3 import Poses
-from pelorus.online import diagnosis
-from pelorus.online.eyes import OpenCvEyes, open_eyes
+from pelorus.native import vision
 from pelorus.rig.lens import Lens, LensModel
-from pelorus.rig.read import Calibrated
+from pelorus.rig.rig import Rig
 from pelorus.tracker import PictureFault
+from pelorus.tracking.eyes import Eyes, Motion, Seen
+from pelorus.wire.frames import Camera
+from scipy.spatial.transform import Rotation
 
 WIDTH, HEIGHT, DISPARITY = 160, 120, 7
 CAMERA = Calibration(200.0, 200.0, (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 0.1)
@@ -104,26 +106,79 @@ def test_a_lens_that_is_not_followed_as_it_is_is_said() -> None:
         Tracker(replace(rig, left=omni))
 
 
-def test_opencv_takes_cameras_that_own_eyes_cannot_and_it_is_told_with_the_remedy() -> None:
-    rig = replace(Tracker.rectified(CAMERA, WIDTH, HEIGHT).rig, T_LB=Poses(np.eye(3), np.zeros(3)))
-    header = rig.header(rig.rectification(), "taken as it is")
-    eyes, why = open_eyes(Calibrated(header, rig), "own")
-    assert not isinstance(eyes, OpenCvEyes)
-    assert not why
-    assert not diagnosis.of_eyes(why)
-    omni = Lens(LensModel.OMNI, (200.0, 200.0, 80.0, 60.0), (1.0,), WIDTH, HEIGHT)
-    odd = replace(rig, left=omni, right=omni)
-    eyes, why = open_eyes(Calibrated(header, odd), "own")
-    assert isinstance(eyes, OpenCvEyes)
-    (told,) = diagnosis.of_eyes(why)
-    assert told.level is diagnosis.Level.WARN
-    assert "a lens omni" in told.message
-    assert "rectify the pictures" in told.do
-    large = replace(header, image_width_px=4000, image_height_px=3000)
-    eyes, why = open_eyes(Calibrated(large, None), "own")
-    assert isinstance(eyes, OpenCvEyes)
-    assert why
-    assert not open_eyes(Calibrated(header, odd), "opencv")[1]  # that is what was asked for
+def seen_by(camera: Camera, rig: Rig | None, pairs: list[tuple[Gray, Gray]]) -> list[Seen]:
+    """Returns what the front end of the desk tells of them."""
+    rows, columns = pairs[0][0].shape
+    eyes = Eyes(camera, (columns, rows), rig, corners=30)
+    return [eyes.search(50_000_000 * k, *pair, None) for k, pair in enumerate(pairs)]
+
+
+def passes_by(seen: list[Seen], step_px: float, disparity_px: float, off_px: float) -> None:
+    """Asserts that the points of the wall went on by so much, with this disparity."""
+    for before, now in pairwise(seen):
+        both, a, b = np.intersect1d(before.ids, now.ids, return_indices=True)
+        assert len(both) >= 12
+        moved = now.pixels[b] - before.pixels[a] - [-step_px, 0, -step_px, 0]
+        assert np.median(np.abs(moved)) < off_px
+        assert np.median(now.pixels[:, 0] - now.pixels[:, 2]) == pytest.approx(
+            disparity_px, abs=off_px
+        )
+
+
+PLAIN = Camera(200.0, 200.0, (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 0.1)
+
+
+def test_a_lens_that_the_library_does_not_take_is_rectified_at_the_desk() -> None:
+    given = Tracker.rectified(CAMERA, WIDTH, HEIGHT).rig
+    four = 200.0, 200.0, (WIDTH - 1) / 2, (HEIGHT - 1) / 2
+    flat = Lens(LensModel.EUCM, four, (0.0, 1.0), WIDTH, HEIGHT)  # alpha = 0: a pinhole
+    odd = replace(given, left=flat, right=flat)
+    with pytest.raises(PelorusError, match="rectify the pictures first"):
+        Tracker(odd)
+    camera = odd.rectification().camera
+    seen = seen_by(camera, odd, [pair(0), pair(2), pair(4)])
+    zoom = camera.fx_px / 200.0
+    passes_by(seen, 2 * zoom, DISPARITY * zoom, 0.2)
+
+
+def test_pictures_that_are_too_large_are_shrunk_and_their_points_are_told_in_their_pixels(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fits = seen_by(PLAIN, None, [pair(0), pair(2), pair(4)])
+    passes_by(fits, 2, DISPARITY, 0.2)
+    large = [tuple(np.kron(one, np.ones((2, 2), np.uint8)) for one in pair(k)) for k in (0, 2, 4)]
+    less = vision.Limits(WIDTH * HEIGHT, vision.limits().tracks)
+    monkeypatch.setattr(vision, "limits", lambda _precision="float32": less)
+    twice = Camera(400.0, 400.0, 2 * PLAIN.cx_px + 0.5, 2 * PLAIN.cy_px + 0.5, 0.1)
+    seen = seen_by(twice, None, large)  # type: ignore[arg-type]
+    for one, small in zip(seen, fits, strict=True):
+        assert np.array_equal(one.ids, small.ids)
+        assert np.abs(one.pixels - (2 * small.pixels + 0.5)).max() < 1e-3
+
+
+def test_a_copy_of_a_tracker_goes_on_by_itself() -> None:
+    tracker = Tracker.rectified(CAMERA, WIDTH, HEIGHT, tracks=30)
+    tracker.track(1, *pair(0))
+    other = tracker.copy()
+    one = other.track(2, *pair(2))
+    assert np.array_equal(tracker.track(2, *pair(2)).observations, one.observations)
+    tracker.forget()
+    assert other.track(3, *pair(4)).report.followed > tracker.track(3, *pair(4)).report.followed
+
+
+def test_a_motion_that_is_told_wrong_costs_few_points_and_a_right_one_is_used() -> None:
+    def again(motion: Motion | None) -> int:
+        eyes = Eyes(PLAIN, (WIDTH, HEIGHT), corners=30)
+        found = [eyes.search(50_000_000 * k, *pair(2 * k), motion) for k in range(4)]
+        return sum(len(np.intersect1d(a.ids, b.ids)) for a, b in pairwise(found))
+
+    turn = Rotation.from_rotvec([0, 0.4, 0]).as_matrix()
+    alone, right, wrong = (
+        again(one) for one in (None, (np.eye(3), np.array([-0.0286, 0, 0])), (turn, np.ones(3)))
+    )
+    assert alone > 45
+    assert right > 45
+    assert wrong >= 0.8 * alone
 
 
 def test_a_velocity_is_three_and_three_numbers() -> None:

@@ -66,16 +66,15 @@ def words(text: str) -> str:
 # --- from a camera to a pose ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("eyes", ["own", "opencv"])
 def test_a_folder_as_a_camera_shows_a_pose_sends_it_and_keeps_a_log_that_replays(
-    once: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], eyes: str
+    once: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = once("room-short", Room(SMALL, drive_s=2.2).write)
     log, listener = tmp_path / "out.plr", socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     listener.bind(("127.0.0.1", 0))
     files = [f"--calibration={folder / name}" for name in ("camchain.yaml", "imu.yaml")]
     to = f"127.0.0.1:{listener.getsockname()[1]}"
-    how = ("--log", str(log), "--udp", to, "--eyes", eyes)
+    how = ("--log", str(log), "--udp", to)
     assert main(["live", "--camera", "folder", str(folder), *files, *how]) == 0
     said = capsys.readouterr().out
     assert " good " in said

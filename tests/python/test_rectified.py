@@ -10,16 +10,22 @@ import cv2
 import numpy as np
 import pytest
 from pelorus.errors import PelorusError
+from pelorus.io.tracks import Tracks
+from pelorus.tracking.eyes import Eyes, Shown, track
 from pelorus.tracking.images import Gray
-from pelorus.tracking.settings import Settings
-from pelorus.tracking.tracker import track
 from rendered import texture
 
 WIDTH, HEIGHT, DISPARITY_PX = 320, 160, 17
 FRAMES, STEP_PX = 12, 2
 WHERE = Path("left"), Path("right")
-FEW = Settings(corners=50)
+FEW = 50
 Pair = tuple[Gray, Gray]
+
+
+def followed(pairs: list[Pair]) -> Tracks:
+    """Returns the tracks as pelorus track makes them."""
+    timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
+    return track(timed, Eyes(None, (WIDTH, HEIGHT), corners=FEW), WHERE)
 
 
 def wall(seed: int, frame: int = 0) -> Pair:
@@ -87,7 +93,7 @@ def covered(left: Gray, right: Gray) -> Pair:
 def test_a_pair_is_taken_however_little_of_it_both_see_and_whether_or_not_it_moves(
     harm: Callable[[Gray, Gray], Pair], standing: bool
 ) -> None:
-    pixels = track(drive(harm, standing), WHERE, FEW).pixels
+    pixels = followed(drive(harm, standing)).pixels
     disparity = pixels[:, 0] - pixels[:, 2]
     assert len(pixels) >= 3 * FRAMES
     assert np.median(disparity) == pytest.approx(DISPARITY_PX, abs=0.2) or harm is fence
@@ -108,4 +114,4 @@ def test_what_is_no_rectified_pair_is_refused_by_what_it_shows(
     harm: Callable[[Gray, Gray], Pair], said: str, standing: bool
 ) -> None:
     with pytest.raises(PelorusError, match=said):
-        track(drive(harm, standing), WHERE, FEW)
+        followed(drive(harm, standing))

@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pelorus.tracking import images, patches
-from pelorus.tracking.settings import Settings
-from pelorus.tracking.tracker import track
+from opencv_tracker import patches
+from opencv_tracker.settings import Settings
+from opencv_tracker.tracker import track as track_by_opencv
+from pelorus.io.tracks import Tracks
+from pelorus.tracking import images
+from pelorus.tracking.eyes import Eyes, Shown, track
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +25,8 @@ AHEAD = 1.03  # a wall ahead grows by so much from one frame to the next
 TURN_DEG = 0.5  # and turns
 FRAMES = 12
 DISPARITY_PX = 8.0
+WHERE = Path("left"), Path("right")
+Pair = tuple[images.Gray, images.Gray]
 
 
 def texture(seed: int) -> Floats:
@@ -82,7 +88,16 @@ def test_a_patch_that_has_doubled_is_cut_anew_and_others_are_kept() -> None:
     assert np.array_equal(renewed.A, np.tile(np.eye(2), (2, 1, 1)))
 
 
-def wander_px(settings: Settings) -> tuple[float, float]:
+def by_eyes(pairs: list[Pair]) -> Tracks:
+    timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
+    return track(timed, Eyes(None, (SIDE_PX, SIDE_PX)), WHERE)
+
+
+def by_opencv(pairs: list[Pair]) -> Tracks:
+    return track_by_opencv(pairs, WHERE, Settings())
+
+
+def wander_px(follow: Callable[[list[Pair]], Tracks]) -> tuple[float, float]:
     """Returns the median distance of tracks on a wall ahead from their birth, young and old."""
     source = texture(5)
     ways = [about_middle(AHEAD**k, TURN_DEG * k) for k in range(FRAMES)]
@@ -91,7 +106,7 @@ def wander_px(settings: Settings) -> tuple[float, float]:
         (warped(source, L, 10 + k), warped(source, R, 50 + k))
         for k, (L, R) in enumerate(zip(ways, shifted, strict=True))
     ]
-    tracks = track(pairs, (Path("left"), Path("right")), settings)
+    tracks = follow(pairs)
     on_wall = np.empty((len(tracks), 2))
     for k, M in enumerate(ways):
         rows = tracks.frame == k
@@ -114,12 +129,13 @@ def wander_px(settings: Settings) -> tuple[float, float]:
 def test_tracks_do_not_wander_from_the_point_of_their_birth(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    young, old = wander_px(Settings())
-    assert old < 0.1
-    assert young < 0.1
+    for follow in (by_eyes, by_opencv):
+        young, old = wander_px(follow)
+        assert old < 0.1
+        assert young < 0.1
     monkeypatch.setattr(
         patches,
         "find",
         lambda _, births, points, __: patches.Refined(points, births, np.ones(len(points))),
     )
-    assert wander_px(Settings())[1] > 2 * old
+    assert wander_px(by_opencv)[1] > 2 * old
