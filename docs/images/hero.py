@@ -25,7 +25,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from numpy.typing import NDArray
 from pelorus import Calibration, Filter, KnownLandmark, observations
-from pelorus.tracking.eyes import Eyes, Shown, track
+from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.io.tracks import Tracks
 from PIL import Image
 from scipy.spatial.transform import Rotation

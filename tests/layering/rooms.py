@@ -34,9 +34,10 @@ ROOMS: dict[str, str] = {
     "simulate": "errors program wire math io",
     "robot": "errors wire",
     "faults": "program wire math io evaluate tracking",
-    "converters": "errors program wire math io evaluate tracking rig tracker faults",
-    "online": "errors wire math io evaluate tracking rig native filter tracker faults converters",
-    "live": "errors program wire math io evaluate tracking rig native robot converters online",
+    "eyes": "errors program wire math io tracking rig native tracker",
+    "converters": "errors program wire math io evaluate tracking rig tracker eyes faults",
+    "online": "errors wire math io evaluate tracking rig native filter eyes faults converters",
+    "live": "errors program wire math io evaluate tracking rig native robot eyes converters online",
     "check": "errors program wire math io evaluate tracking native faults converters",
     "explain": "errors wire math io evaluate tracking check",
     "flight": "errors wire native robot",
@@ -44,7 +45,7 @@ ROOMS: dict[str, str] = {
     "view": "errors program wire math io evaluate",
     "report": "errors program wire math io evaluate tracking native converters check explain grid",
     "fleet": "errors program wire math io evaluate native check explain report",
-    "commands": "errors program wire math io evaluate tracking rig native simulate robot faults "
+    "commands": "errors program wire math io evaluate tracking rig native simulate robot eyes faults "
     "converters online live check explain flight grid view report fleet",
 }
 ROOT = {"__init__.py", "__main__.py", "errors.py", "filter.py", "tracker.py"}

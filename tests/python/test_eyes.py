@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pelorus import Calibration, FilterError, PelorusError, Tracker
+from pelorus.eyes.front_end import Eyes, Motion, Seen
 from pelorus.native import vision
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
 from pelorus.tracker import PictureFault
-from pelorus.tracking.eyes import Eyes, Motion, Seen
 from pelorus.wire.frames import Camera
 from scipy.spatial.transform import Rotation
 

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 from pelorus.errors import PelorusError
+from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.io.tracks import Tracks
-from pelorus.tracking.eyes import Eyes, Shown, track
 from pelorus.tracking.images import Gray
 from rendered import texture
 

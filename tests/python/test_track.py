@@ -20,6 +20,7 @@ from opencv_tracker.settings import Settings
 from pelorus.check.checked import Checked, check, config_text
 from pelorus.check.contents import recording_of
 from pelorus.evaluate.evaluation import assess
+from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.named import judged_of
 from pelorus.faults.two_views import two_views
@@ -30,7 +31,6 @@ from pelorus.io.tracks import Tracks, triangulate
 from pelorus.io.trajectory import Trajectory
 from pelorus.math import se3
 from pelorus.tracking import images
-from pelorus.tracking.eyes import Eyes, Shown, track
 from pelorus.wire import framing
 from pelorus.wire.frames import Camera, TwistTiming
 from pelorus_course import matlab
@@ -46,6 +46,7 @@ SIDE, FALL = 70, 5  # px, and px a frame: a thing that falls
 WALL_M, BOARD_M, BOARD_HALF_M = 12.0, 5.0, 1.3  # a board stands before a wall
 DRAWS = 5
 FEW, MANY = 60, 200
+WHERE = Path("left"), Path("right")
 MISSES = 5  # PLR_VISION_MISSES: pairs that a track may be unseen
 
 
@@ -100,8 +101,7 @@ def followed(pairs: Frames, corners: int = FEW) -> Tracks:
     """Returns the tracks as pelorus track makes them."""
     height, width = pairs[0][0].shape
     timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
-    eyes = Eyes(None, (width, height), corners=corners)
-    return track(timed, eyes, (Path("left"), Path("right")))
+    return track(timed, Eyes(None, (width, height), corners=corners), WHERE)
 
 
 def in_world(tracks: Tracks) -> NDArray[np.float64]:
@@ -129,12 +129,10 @@ def test_a_track_has_no_gap_longer_than_the_library_waits_and_ends_at_a_cut(fram
         assert (np.diff(tracks.frame[tracks.id == id]) <= 1 + MISSES).all()
     assert np.median(np.bincount(tracks.id)) >= 3
     upside_down = np.flipud(frames[5][0]).copy(), np.flipud(frames[5][1]).copy()
-    with_a_cut = [*frames[:5], upside_down, upside_down, *frames[7:]]
-    cut = followed(with_a_cut)
+    cut = followed([*frames[:5], upside_down, upside_down, *frames[7:]])
     before, there, behind = (set(cut.id[cut.frame == k].tolist()) for k in (4, 5, 7))
-    by_chance = 0.15 * len(before)  # patches of one texture may be alike
-    assert len(before & there) <= by_chance
-    assert len(there & behind) <= by_chance
+    for two in (before & there, there & behind):
+        assert len(two) <= 0.15 * len(before)  # patches of one texture may be alike
 
 
 def test_corners_are_no_more_than_asked_for_and_spread_over_the_picture(frames: Frames) -> None:
@@ -389,8 +387,7 @@ def by_eyes(pairs: list[images.Pair]) -> Tracks:
 
 def by_opencv(pairs: list[images.Pair]) -> Tracks:
     """Returns those of the judge."""
-    shown = (images.read(pair) for pair in pairs)
-    tracks = tracker.track(shown, (Path("left"), Path("right")), Settings(corners=120))
+    tracks = tracker.track(map(images.read, pairs), WHERE, Settings(corners=120))
     assert np.median(np.bincount(tracks.id)) >= 5
     return tracks
 

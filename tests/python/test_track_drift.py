@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from opencv_tracker import patches
 from opencv_tracker.settings import Settings
 from opencv_tracker.tracker import track as track_by_opencv
+from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.io.tracks import Tracks
 from pelorus.tracking import images
-from pelorus.tracking.eyes import Eyes, Shown, track
 
 Floats = NDArray[np.float64]
 

@@ -23,6 +23,8 @@ from pathlib import Path
 
 import judge
 import numpy as np
+from pelorus.eyes.front_end import Eyes, Shown
+from pelorus.eyes.front_end import track as track_alone
 from pelorus.io import trajectory
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
@@ -30,8 +32,6 @@ from pelorus.math import se3
 from pelorus.math.se3 import Poses
 from pelorus.tracker import Tracker
 from pelorus.tracking import images
-from pelorus.tracking.eyes import Eyes, Shown
-from pelorus.tracking.eyes import track as track_alone
 from pelorus.wire.frames import Camera, Report, TwistTiming
 from pelorus_course import matlab
 from scipy.spatial.transform import Rotation

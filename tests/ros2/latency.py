@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Latency of the node from picture to odometry, on real pictures over a real ROS 2.
 
-usage: tools/ros2.sh -s tests/ros2/latency.py [-k own|opencv]     (it reports, and bars nothing)
+usage: tools/ros2.sh -s tests/ros2/latency.py     (it reports, and bars nothing)
 
 EuRoC MH_01's first ten seconds of $PELORUS_DATA, pictures at 20 Hz and the IMU at 200 Hz, are
 played at the pace of their stamps by this process to the node in another one. A picture's latency
@@ -37,8 +37,7 @@ def ns(stamp: Time) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
-@pytest.mark.parametrize("eyes", ["own", "opencv"])
-def test_latency_from_picture_to_odometry(eyes: str, tmp_path: Path) -> None:
+def test_latency_from_picture_to_odometry(tmp_path: Path) -> None:
     """Prints it, beside the poses that came and the node's CPU; its log replays to the bit."""
     if not FOLDER.is_dir():
         pytest.skip(f"{FOLDER} is not here")
@@ -58,7 +57,7 @@ def test_latency_from_picture_to_odometry(eyes: str, tmp_path: Path) -> None:
     log = tmp_path / "drive.plr"
     settings = [f"{name}={value}" for name, value in settings_given(CONF, []).items()]
     parameters = {
-        "eyes": eyes, "image_qos": "reliable", "calibration": calibration, "base_frame": "",
+        "image_qos": "reliable", "calibration": calibration, "base_frame": "",
         "settings": settings, "log": str(log),
     }  # fmt: skip
     sent_s: dict[int, float] = {}
@@ -91,7 +90,7 @@ def test_latency_from_picture_to_odometry(eyes: str, tmp_path: Path) -> None:
     offset_ns = min((t - s for t in used for s in sent_s), key=abs)
     lost = [k for k, t in enumerate(sorted(sent_s)) if t + offset_ns not in used]
     print(
-        f"\neyes {eyes}: {len(sent_s)} pairs, lost {lost or 'none'}; {len(late_ms)} poses; "
+        f"\n{len(sent_s)} pairs, lost {lost or 'none'}; {len(late_ms)} poses; "
         f"picture to odometry {median:.1f} ms in the median, {p99:.1f} ms p99; "
         f"CPU of the node {spent_s:.1f} s\n" + "\n".join(told)
     )

@@ -11,11 +11,11 @@ import typer
 from rich.markup import escape
 
 from pelorus.errors import PelorusError, resolved
+from pelorus.eyes.front_end import CORNERS, Eyes, Shown
+from pelorus.eyes.front_end import track as track_all
 from pelorus.io.tracks import Tracks
 from pelorus.program.console import out, progress
 from pelorus.tracking import images, output, sheet
-from pelorus.tracking.eyes import CORNERS, Eyes, Shown
-from pelorus.tracking.eyes import track as track_all
 from pelorus.tracking.images import Gray, Pair
 from pelorus.tracking.row_gaps import TOLD_ABOVE_PX, row_gaps
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from pelorus.eyes.front_end import Motion
 from pelorus.math import motion, se3
 from pelorus.math.inertial import Inertial
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
-from pelorus.tracking.eyes import Motion
 from pelorus.wire.frames import TwistTiming
 from pelorus.wire.layout import Floats
 

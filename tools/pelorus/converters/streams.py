@@ -17,10 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.converters import earth_start, full_scale, repeated, twist_noise
+from pelorus.converters import earth_start, full_scale, raw_tracks, repeated, twist_noise
 from pelorus.converters.expected import Expected
 from pelorus.errors import PelorusError
-from pelorus.faults import resolution, stale
+from pelorus.eyes.front_end import Eyes, Shown, track
+from pelorus.faults import stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
 from pelorus.io.foreign import ForeignFileError
@@ -33,10 +34,8 @@ from pelorus.math.se3 import Poses
 from pelorus.program.console import progress
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
-from pelorus.rig.rectification import Gray, Rectification
-from pelorus.rig.rig import Rig
+from pelorus.rig.rectification import Gray
 from pelorus.tracking import images
-from pelorus.tracking.eyes import Eyes, Shown, track
 from pelorus.wire.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
 from pelorus.wire.layout import Floats
 
@@ -168,12 +167,12 @@ def _made(streams: Streams) -> tuple[Recording, list[Finding]]:
         header, tracks, rig = calibrated.header, frames.tracks, calibrated.rig
         sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
         if len(sizes) == 1:
-            _require_resolution(frames.where, tracks, sizes[0])
+            raw_tracks.require_resolution(frames.where, tracks, sizes[0])
         if rig is not None:
-            rig = _of_pixels(rig, tracks)
+            rig = raw_tracks.of_pixels(rig, tracks)
             rectification = rig.rectification()
             header = rig.header(rectification, header.name)
-            tracks = _rectified(tracks, rectification, frames.where)
+            tracks = raw_tracks.rectified(tracks, rectification, frames.where)
         moves = _moves(streams.motion, t_ns)
         t_ns, tracks, found = repeated.left_out(moves, t_ns, tracks, header.camera)
     made, more = of_drive(header, streams, t_ns, tracks, truth)
@@ -389,45 +388,6 @@ def _require_overlap(frames: Pictures | RawTracks, t_ns: Times, motion: Twists |
 
 
 # --- frames ---------------------------------------------------------------------------------------
-
-
-def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
-    """Returns the rig at the smallest of its resolutions that holds all pixels."""
-    if not rig.others or not len(tracks):
-        return rig
-    most = tracks.pixels.max(axis=0).reshape(2, 2).max(axis=0)
-    holding = [size for size in rig.sizes if (most < size).all()]
-    if not holding:
-        raise ForeignFileError(
-            rig.path,
-            f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
-            expected="the calibration of these pictures is needed",
-        )
-    return rig.of_size(*min(holding, key=np.prod))
-
-
-def _require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> None:
-    words = resolution.beyond(tracks.pixels, size)
-    if words:
-        raise ForeignFileError(
-            where,
-            words,
-            expected="the calibration of these pictures, or pixels of those, are expected",
-        )
-
-
-def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tracks:
-    """Rectifies the cameras' pixels; leaves out those that no ray of the lens reaches."""
-    pixels = rectification.pixels(tracks.pixels)
-    good = np.isfinite(pixels).all(axis=1)
-    if not good.any():
-        raise ForeignFileError(
-            source,
-            "no pixel is one of the calibration's lenses",
-            expected="pixels as the cameras took them are expected, of the calibration's "
-            "resolution",
-        )
-    return replace(tracks, pixels=pixels).at(np.nonzero(good)[0])
 
 
 def _expected(streams: Streams, header: Header, t_ns: Times) -> Expected:

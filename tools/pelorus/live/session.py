@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from pelorus.eyes.front_end import Seen
 from pelorus.live.camera import Camera, Force, Measured, Picture, Rate
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
@@ -20,7 +21,6 @@ from pelorus.online.diagnosis import Level, Status
 from pelorus.online.drive import Setup
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline, header_of
-from pelorus.tracking.eyes import Seen
 from pelorus.wire.frames import Header, Imu, Message, Stereo
 
 REMEDY_FOR_G = f"multiply its readings by {G_MPS2:g}"

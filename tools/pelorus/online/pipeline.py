@@ -17,6 +17,7 @@ import numpy as np
 from pelorus.converters.streams import FORCES_MPS2
 from pelorus.errors import PelorusError
 from pelorus.evaluate.health import DEGRADED, LOST
+from pelorus.eyes.front_end import Eyes, Seen
 from pelorus.faults.sync import PictureDelay
 from pelorus.math.inertial import Inertial
 from pelorus.math.se3 import Poses
@@ -26,7 +27,6 @@ from pelorus.online.order import Datum
 from pelorus.online.pairs import Joining, Pairing
 from pelorus.online.together import Together
 from pelorus.rig.read import Calibrated
-from pelorus.tracking.eyes import Eyes, Seen
 from pelorus.tracking.images import Gray
 from pelorus.wire.frames import Header, Imu, Process, Stereo, Twist
 from pelorus.wire.layout import Floats

@@ -7,9 +7,9 @@ from collections import deque
 
 import numpy as np
 
+from pelorus.eyes.front_end import Seen
 from pelorus.faults.sync import PictureDelay, apart
 from pelorus.io.tracks import Tracks
-from pelorus.tracking.eyes import Seen
 from pelorus.wire.frames import Camera
 
 FRAMES, EVERY = 40, 20  # looked at together, and so often

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pelorus.converters import ros_frames
 from pelorus.errors import PelorusError, write_text
+from pelorus.eyes.front_end import Seen
 from pelorus.io.known_map import known_map
 from pelorus.online import diagnosis
 from pelorus.online.diagnosis import Status
 from pelorus.online.drive import Setup
 from pelorus.online.odometry import Given, Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline
-from pelorus.tracking.eyes import Seen
 from pelorus.wire import schema
 from pelorus.wire.frames import Imu, Reading, Twist
 from pelorus.wire.layout import Floats

@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
+from pelorus.eyes.rectified import Evidence
 from pelorus.io.tracks import Tracks
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
@@ -27,7 +28,6 @@ from pelorus.tracker import Seen as Found
 from pelorus.tracker import Tracker, is_followed
 from pelorus.tracking import visual_motion
 from pelorus.tracking.images import PAIRS_MIN, Gray
-from pelorus.tracking.rectified import Evidence
 from pelorus.wire.frames import Camera
 from pelorus.wire.layout import Floats
 
@@ -90,7 +90,10 @@ class Eyes:
         most = vision.limits()[0]
         self._times = next(k for k in range(1, width + 1) if (width // k) * (height // k) <= most)
         taken = rig is not None and self._times == 1 and is_followed(rig.left, rig.right)
-        how = {"tracks": corners, "disparity_max_px": -(-disparity_max_px // self._times)}
+        how: dict[str, Any] = {
+            "tracks": corners,
+            "disparity_max_px": -(-disparity_max_px // self._times),
+        }
         if rig is not None and taken:
             self._tracker = Tracker(rig, camera=camera, **how)
         else:
