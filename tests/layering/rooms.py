@@ -45,8 +45,8 @@ ROOMS: dict[str, str] = {
     "view": "errors program wire math io evaluate",
     "report": "errors program wire math io evaluate tracking native converters check explain grid",
     "fleet": "errors program wire math io evaluate native check explain report",
-    "commands": "errors program wire math io evaluate tracking rig native simulate robot eyes faults "
-    "converters online live check explain flight grid view report fleet",
+    "commands": "errors program wire math io evaluate tracking rig native simulate robot eyes "
+    "faults converters online live check explain flight grid view report fleet",
 }
 ROOT = {"__init__.py", "__main__.py", "errors.py", "filter.py", "tracker.py"}
 VERSIONS = {"__version__", "ARITHMETIC"}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""From rectified stereo pictures to stereo tracks: pelorus track."""
+"""Pictures in folders, and what stereo tracks show of the camera's motion."""
