@@ -22,7 +22,7 @@ extern "C" {
 /* Increases with every change of the source that changes the bits of a result. It is part of the
  * build fingerprint, so a log shows whether it was made by the same arithmetic as this source's.
  * tests/golden fails if the bits change and this number does not. */
-#define PLR_ARITHMETIC 24
+#define PLR_ARITHMETIC 25
 
 /* Precision of the filter's arithmetic: 32 (float; default) or 64 (double). For the model `body`
  * float is as accurate (docs/NUMERICS.md) and takes half the RAM; choose 64 for `world`. */
