@@ -11,6 +11,7 @@
 #include "pelorus/session.h"
 #include "pelorus/state_store.h"
 #include "port_serial.h"
+#include "sensors.h"
 #include "serial.h"
 #include "startup.h"
 #include "telemetry.h"
@@ -49,6 +50,18 @@ static void announce(void) {
     (void)plr_writer_put(&session.writer, &message);
 }
 
+/* Cameras and IMU of the board's own: what is wrong with them people are told. */
+static void start_sensors(void) {
+    static plr_message message;
+    const char *trouble = sensors_start();
+    if (trouble != NULL) {
+        message.kind = PLR_KIND_TEXT;
+        message.as.text.severity = PLR_SEVERITY_ERROR;
+        strncpy(message.as.text.text, trouble, PLR_WIRE_MAX_TEXT);
+        (void)plr_writer_put(&session.writer, &message);
+    }
+}
+
 /* Where a state is kept, or NULL where the board has no such place. */
 static plr_state_store *storage(void) {
     plr_block_device device;
@@ -74,7 +87,9 @@ int main(void) {
         return 1; /* startup resets the board: only a broken build comes here */
     }
     announce();
+    start_sensors();
     for (;;) {
         (void)plr_session_step(&session);
+        sensors_step(&session);
     }
 }
