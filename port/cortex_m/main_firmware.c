@@ -82,6 +82,7 @@ int main(void) {
     options.known_capacity = KNOWN_LANDMARKS;
     options.store = storage();
     options.eyes = firmware_eyes();
+    options.output |= sensors_output;
     options.observer = telemetry_observer(&session);
     if (plr_session_init(&session, &port, &options) != PLR_OK) {
         return 1; /* startup resets the board: only a broken build comes here */

@@ -5,6 +5,9 @@
 
 #include "pelorus/session.h"
 
+/* What the session says beside the usual, bits of plr_output: a host can replay only what it has seen. */
+extern const uint32_t sensors_output;
+
 /* Starts them, in bounded time, with interrupts on. Returns what is wrong, in words for people, or NULL. */
 const char *sensors_start(void);
 

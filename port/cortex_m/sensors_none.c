@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "sensors.h"
 
+const uint32_t sensors_output = 0;
+
 const char *sensors_start(void) {
     return 0;
 }

@@ -8,7 +8,6 @@
 #include "board.h"
 #include "camera.h"
 #include "clock.h"
-#include "core.h"
 #include "exposure.h"
 #include "eyes.h"
 #include "sensors.h"
@@ -31,6 +30,8 @@ enum {
 #define CAMERA_LATE_NS UINT64_C(30000000)
 /* Within which some pattern must come: a picture does every 50 ms. */
 #define PATTERN_NS UINT64_C(500000000)
+
+const uint32_t sensors_output = PLR_OUTPUT_ECHO;
 
 static plr_eyes eyes __attribute__((section(".bss.eyes")));
 static uint32_t first_pair[2][PIXELS / 4] __attribute__((section(".bss.pictures")));
