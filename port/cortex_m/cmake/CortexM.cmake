@@ -11,8 +11,12 @@ set(spent_in ${PELORUS_SOURCES})
 list(FILTER spent_in INCLUDE REGEX "/src/(math/(blocks3|checksum|dense|packed|se3|so3)|process/(imu[a-z_]*|twist|statistics)|sensor/stereo|\
 state/(covariance[a-z_]*|model_body|polar|rigid_fit)|\
 filter/(correction|guard|motion_first|search)|\
-vision/(corners|lens|patch|pyramid|rig|track|vision|watch))\\.c$")
+vision/(corners|kernels|lens|patch|pyramid|rig|track|vision|watch))\\.c$")
 set_source_files_properties(${spent_in} PROPERTIES COMPILE_OPTIONS -O3)
+
+# The loops over pixels may be in vectors of integers: they change no bit, which those of floats would.
+set_source_files_properties("${PELORUS_ROOT}/src/vision/kernels.c" PROPERTIES
+  COMPILE_OPTIONS "-O3;$<TARGET_PROPERTY:PIXEL_OPTIONS>")
 
 set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
 set(IMAGES "${CMAKE_CURRENT_BINARY_DIR}/images")
@@ -50,6 +54,7 @@ function(cortexm_options target cpu)
   set_target_properties(${target} PROPERTIES
     C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF EXCLUDE_FROM_ALL ON)
   target_compile_options(${target} PRIVATE ${cpu_${cpu}} -g)
+  set_target_properties(${target} PROPERTIES PIXEL_OPTIONS "${cpu_${cpu}_pixels}")
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:C>:${flags_c}>")
 endfunction()
 
