@@ -82,20 +82,19 @@ static void compare_bytes(tally *t, const void *a, const void *b, size_t n) {
     t->different += memcmp(a, b, n) != 0;
 }
 
-/* As large as the memory lets it be; rows of 560 bytes make offsets of more than 16 bits. */
+/* As large as the memory lets it be. */
 static plr_image next_image(void) {
     plr_image image = {picture, 64 + below(497), 0, 0};
-    if (below(4) == 0) {
-        image.stride = 560;
-    }
     image.width = (uint16_t)(image.stride - below(8));
     image.height = (uint16_t)(PICTURE / image.stride < 400 ? PICTURE / image.stride : 400);
     return image;
 }
 
-/* Patches that are turned, stretched and mirrored, by up to eight times. */
+/* Patches that are turned, stretched and mirrored, by up to eight times; of those that are the highest, offsets in a
+ * wide picture have more than 16 bits. */
 static void sum_pixels_both_ways(tally *t, const plr_template *template) {
-    const plr_image image = next_image();
+    const bool high = below(8) == 0;
+    plr_image image = next_image();
     const plr_real most = below(2) ? PLR_R(1.5) : PLR_R(8);
     plr_patch_sums by_kernel, by_twin;
     plr_grid g;
@@ -104,6 +103,11 @@ static void sum_pixels_both_ways(tally *t, const plr_template *template) {
     at[1] = (next_number() + 1) / 2 * (plr_real)image.height;
     for (int i = 0; i < 4; i++) {
         A[i] = most * next_number();
+    }
+    if (high) {
+        image = (plr_image){picture, 560, 560, 131};
+        at[0] = 280, at[1] = 65;
+        A[2] = PLR_R(7.8) + next_number() / 10, A[3] = -A[2];
     }
     if (plr_grid_place(&g, &image, at, A)) {
         plr_patch_sum(&by_kernel, &image, &g, template);
