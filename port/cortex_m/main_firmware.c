@@ -23,11 +23,11 @@ enum { KNOWN_LANDMARKS = 64 };
 static plr_session session;
 static plr_landmark known[KNOWN_LANDMARKS];
 static plr_state_store store;
+static plr_message message; /* the firmware's own */
 
 /* The first frames after a reset. A host that receives the REPORT during a drive knows that the board
  * has lost its state; the TEXT tells people the name of the board, its build, and why it started. */
 static void announce(void) {
-    static plr_message message;
     static text words;
     const uint8_t delimiter = 0; /* ends a frame that the reset may have cut */
     (void)serial_write(&serial_link, &delimiter, 1);
@@ -52,7 +52,6 @@ static void announce(void) {
 
 /* Cameras and IMU of the board's own: what is wrong with them people are told. */
 static void start_sensors(void) {
-    static plr_message message;
     const char *trouble = sensors_start();
     if (trouble != NULL) {
         message.kind = PLR_KIND_TEXT;
