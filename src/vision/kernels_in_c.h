@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* Included by kernels.c. */
+#ifndef PLR_VISION_KERNELS_IN_C_H
+#define PLR_VISION_KERNELS_IN_C_H
 
 void plr_patch_sample(const plr_image *image, int32_t x, int32_t y,
                       uint8_t patch[PLR_PATCH_BYTES]) {
@@ -19,3 +21,5 @@ void plr_patch_sum(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
 void plr_pyramid_halve(const plr_image *in, uint8_t *out) {
     plr_pyramid_halve_plain(in, out);
 }
+
+#endif

@@ -5,6 +5,9 @@
  *
  * Where even and odd lanes come apart (b, t: bottom and top) they are put together again by a narrowing shift.
  */
+#ifndef PLR_VISION_KERNELS_MVE_H
+#define PLR_VISION_KERNELS_MVE_H
+
 #include <arm_mve.h>
 
 enum { PLR_LANES = 8, PLR_LAST = PLR_PATCH_SIDE - 1 };
@@ -246,3 +249,5 @@ void plr_pyramid_halve(const plr_image *in, uint8_t *out) {
             plr_halve_strip(row, in->width, x + n <= width ? x : width - n, n, out);
     }
 }
+
+#endif
