@@ -35,10 +35,12 @@ enum { PLR_HALVED_AT_ONCE = 64 };
 
 void plr_patch_sample_plain(const plr_image *image, int32_t x, int32_t y,
                             uint8_t patch[PLR_PATCH_BYTES]) {
+    const plr_image here =
+        *image; /* bytes of a patch might be its own, for all that a compiler knows */
     for (int j = 0; j < PLR_PATCH_KEPT; j++)
         for (int i = 0; i < PLR_PATCH_KEPT; i++) {
             const int32_t s =
-                plr_sample(image, x + i * (1 << PLR_FRACTION), y + j * (1 << PLR_FRACTION));
+                plr_sample(&here, x + i * (1 << PLR_FRACTION), y + j * (1 << PLR_FRACTION));
             patch[PLR_PATCH_KEPT * j + i] = (uint8_t)((s + PLR_GREY / 2) / PLR_GREY);
         }
 }
