@@ -126,6 +126,16 @@ extern "C" {
 #define PLR_ROW_FILE "math/row_in_c.h"
 #endif
 
+/* Eyes' loops over pixels: in the integer vectors of a Cortex-M55 where the compiler may use them, else in C. They
+ * change no bit. */
+#if defined(__ARM_FEATURE_MVE) && !PLR_PORTABLE
+#define PLR_PIXELS_MVE  1
+#define PLR_PIXELS_FILE "vision/kernels_mve.h"
+#else
+#define PLR_PIXELS_MVE  0
+#define PLR_PIXELS_FILE "vision/kernels_in_c.h"
+#endif
+
 #if defined(__FAST_MATH__)
 #error "Pelorus needs IEEE arithmetic: build without -ffast-math."
 #endif

@@ -4,14 +4,9 @@
 #include <string.h>
 
 #include "math/small.h"
+#include "vision/kernels.h"
 
-enum {
-    HALF = PLR_PATCH_SIDE / 2,
-    KEPT_HALF = PLR_PATCH_KEPT / 2,
-    FRACTION = 16,
-    WEIGHT = 6,
-    FINE = 6
-};
+enum { HALF = PLR_PATCH_SIDE / 2, KEPT_HALF = PLR_PATCH_KEPT / 2, FINE = 6 };
 
 #define UNIT     PLR_R(65536)
 #define STEP_MAX PLR_R(2)    /* px */
@@ -28,15 +23,6 @@ enum {
 
 /* --- cutting --- */
 
-/* The sample at a place in 1/65536 px: grey levels times 16. */
-static inline int32_t sample(const plr_image *image, int32_t x, int32_t y) {
-    const uint8_t *p = image->pixels + (uint32_t)(y >> FRACTION) * image->stride + (x >> FRACTION);
-    const uint8_t *q = p + image->stride;
-    const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63, wy = (y >> (FRACTION - WEIGHT)) & 63;
-    const int32_t top = 64 * p[0] + wx * (p[1] - p[0]), low = 64 * q[0] + wx * (q[1] - q[0]);
-    return (64 * top + wy * (low - top) + 128) >> 8;
-}
-
 /* Places of a window of so many px each way that stay inside, with the neighbour that is interpolated. */
 static bool inside(const plr_image *image, const plr_real at[2], plr_real across, plr_real down) {
     const plr_real right = (plr_real)image->width - PLR_R(1.01);
@@ -46,19 +32,14 @@ static bool inside(const plr_image *image, const plr_real at[2], plr_real across
 
 /* Rounded to the weights' resolution. */
 static int32_t fixed(plr_real x) {
-    return (int32_t)(x * UNIT) + (1 << (FRACTION - WEIGHT - 1));
+    return (int32_t)(x * UNIT) + (1 << (PLR_FRACTION - PLR_WEIGHT - 1));
 }
 
 bool plr_patch_cut(const plr_image *image, const plr_real at[2], uint8_t patch[PLR_PATCH_BYTES]) {
     if (!inside(image, at, KEPT_HALF, KEPT_HALF))
         return false;
-    const int32_t x = fixed(at[0]), y = fixed(at[1]);
-    for (int j = 0; j < PLR_PATCH_KEPT; j++)
-        for (int i = 0; i < PLR_PATCH_KEPT; i++) {
-            const int32_t s = sample(image, x + (i - KEPT_HALF) * (1 << FRACTION),
-                                     y + (j - KEPT_HALF) * (1 << FRACTION));
-            patch[PLR_PATCH_KEPT * j + i] = (uint8_t)((s + PLR_GREY / 2) / PLR_GREY);
-        }
+    plr_patch_sample(image, fixed(at[0]) - KEPT_HALF * (1 << PLR_FRACTION),
+                     fixed(at[1]) - KEPT_HALF * (1 << PLR_FRACTION), patch);
     return true;
 }
 
@@ -68,20 +49,13 @@ static plr_real central(int64_t sum_ab, int32_t sum_a, int32_t sum_b) {
 }
 
 bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]) {
-    int32_t T = 0, Jx = 0, Jy = 0, TT = 0, xT = 0, yT = 0, xx = 0, xy = 0, yy = 0;
-    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++)
-        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++) {
-            const uint8_t *p = patch + PLR_PATCH_KEPT * (j + 1) + i + 1;
-            const int32_t s = PLR_GREY * p[0], x = PLR_GREY / 2 * (p[1] - p[-1]);
-            const int32_t y = PLR_GREY / 2 * (p[PLR_PATCH_KEPT] - p[-PLR_PATCH_KEPT]);
-            t->T[k] = (int16_t)s, t->Jx[k] = (int16_t)x, t->Jy[k] = (int16_t)y;
-            T += s, Jx += x, Jy += y;
-            TT += s * s, xT += x * s, yT += y * s;
-            xx += x * x, xy += x * y, yy += y * y;
-        }
-    t->sum_T = T, t->sum_Jx = Jx, t->sum_Jy = Jy;
-    t->TT = central(TT, T, T), t->JxT = central(xT, Jx, T), t->JyT = central(yT, Jy, T);
-    t->H[0] = central(xx, Jx, Jx), t->H[1] = central(xy, Jx, Jy), t->H[2] = central(yy, Jy, Jy);
+    plr_template_sums s;
+    plr_template_fill(t, patch, &s);
+    t->sum_T = s.T, t->sum_Jx = s.Jx, t->sum_Jy = s.Jy;
+    t->TT = central(s.TT, s.T, s.T);
+    t->JxT = central(s.xT, s.Jx, s.T), t->JyT = central(s.yT, s.Jy, s.T);
+    t->H[0] = central(s.xx, s.Jx, s.Jx), t->H[1] = central(s.xy, s.Jx, s.Jy);
+    t->H[2] = central(s.yy, s.Jy, s.Jy);
     const plr_real det = PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
     /* the smaller eigenvalue is at least det / trace */
     return t->TT > 0 && det > WEAKEST * (t->H[0] + t->H[2]);
@@ -115,30 +89,6 @@ bool plr_grid_place(plr_grid *g, const plr_image *image, const plr_real at[2],
     for (int i = 0; i < 4; i++)
         g->A[i] = (int32_t)(A[i] * UNIT);
     return true;
-}
-
-/* Sums in 32 bits: 81 times the largest product, 4080^2, is 1.35e9. */
-void plr_patch_sum(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
-                   const plr_template *t) {
-    const uint8_t *pixels = image->pixels;
-    const uint32_t stride = image->stride;
-    int32_t I = 0, II = 0, IT = 0, IJx = 0, IJy = 0;
-    int32_t x0 = g->x - HALF * (g->A[0] + g->A[1]), y0 = g->y - HALF * (g->A[2] + g->A[3]);
-    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++, x0 += g->A[1], y0 += g->A[3]) {
-        int32_t x = x0, y = y0;
-        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++, x += g->A[0], y += g->A[2]) {
-            const uint8_t *p = pixels + (uint32_t)(y >> FRACTION) * stride + (x >> FRACTION);
-            const uint8_t *q = p + stride;
-            const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63;
-            const int32_t wy = (y >> (FRACTION - WEIGHT)) & 63;
-            const int32_t top = 64 * p[0] + wx * (p[1] - p[0]);
-            const int32_t low = 64 * q[0] + wx * (q[1] - q[0]);
-            const int32_t v = (64 * top + wy * (low - top) + 128) >> 8;
-            I += v, II += v * v;
-            IT += v * t->T[k], IJx += v * t->Jx[k], IJy += v * t->Jy[k];
-        }
-    }
-    s->I = I, s->II = II, s->IT = IT, s->IJx = IJx, s->IJy = IJy;
 }
 
 /* --- fits --- */
@@ -263,8 +213,8 @@ static void sum_slopes(slope_sums *s, const plr_image *image, const plr_grid *g,
     memset(s, 0, sizeof *s);
     for (int j = -HALF, k = 0; j <= HALF; j++)
         for (int i = -HALF; i <= HALF; i++, k++) {
-            const int32_t I =
-                sample(image, g->x + i * g->A[0] + j * g->A[1], g->y + i * g->A[2] + j * g->A[3]);
+            const int32_t I = plr_sample(image, g->x + i * g->A[0] + j * g->A[1],
+                                         g->y + i * g->A[2] + j * g->A[3]);
             const int32_t r = gain * I / (1 << FINE) - t->T[k];
             const int32_t along = (t->Jx[k] * c[0] + t->Jy[k] * c[1]) / (1 << FINE);
             const int32_t K[2] = {along * i, along * j}, J[2] = {t->Jx[k], t->Jy[k]};
