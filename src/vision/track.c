@@ -246,19 +246,6 @@ static void learn_slope(const plr_vision *v, const plr_scene *s, const plr_templ
     plr_track_weigh_slope(t->surface.slope, t->slope_info, slope_prior(v, t), measured, info);
 }
 
-/* Fits the right picture with the patch deformed as the surface lies, and learns how it does. */
-static bool match_by_slope(plr_vision *v, const plr_scene *s,
-                           const uint8_t (*patch)[PLR_PATCH_BYTES], unsigned from, plr_track *t,
-                           plr_real at[2]) {
-    plr_template template;
-    plr_real A[4];
-    if (!plr_rig_across(v, &s->motion, t->at, &t->surface, at, A) ||
-        !fit_right(v, s, patch, from, A, t, at, &template))
-        return false;
-    learn_slope(v, s, &template, A, t, at);
-    return true;
-}
-
 /* The two likeliest places along the line. */
 typedef struct plr_candidates {
     plr_real best, best_disparity, second;
@@ -310,21 +297,21 @@ static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t, c
 
 bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool birth) {
     uint8_t patch[2][PLR_PATCH_BYTES];
-    plr_real at[2];
-    if (!birth) {
-        const unsigned wanted = search_level(v, v->levels) > 0 ? 2 : 1;
-        const unsigned levels = cut(&s->side[PLR_LEFT], t->at, wanted, patch);
-        return levels > 0 &&
-               match_by_slope(v, s, (const uint8_t(*)[PLR_PATCH_BYTES])patch, levels - 1, t, at);
-    }
-    const uint8_t(*const born)[PLR_PATCH_BYTES] = (const uint8_t(*)[PLR_PATCH_BYTES])t->patch;
+    plr_template template;
+    plr_real at[2], A[4];
     const unsigned level = search_level(v, t->levels);
-    if (!search_line(v, s, t, born[level], level, false, &t->surface.disparity))
+    if (birth && !search_line(v, s, t, t->patch[level], level, false, &t->surface.disparity))
         return false;
-    for (int again = 0; again < SLOPE_FITS; again++)
-        if (!match_by_slope(v, s, born, again == 0 ? level : 0, t, at))
+    const unsigned wanted = search_level(v, v->levels) > 0 ? 2 : 1;
+    unsigned levels = cut(&s->side[PLR_LEFT], t->at, wanted, patch);
+    for (int fits = birth ? SLOPE_FITS : 1; fits > 0 && levels > 0; fits--, levels = 1) {
+        if (!plr_rig_across(v, &s->motion, t->at, &t->surface, at, A) ||
+            !fit_right(v, s, (const uint8_t(*)[PLR_PATCH_BYTES])patch, levels - 1, A, t, at,
+                       &template))
             return false;
-    return true;
+        learn_slope(v, s, &template, A, t, at);
+    }
+    return levels > 0;
 }
 
 bool plr_track_mirrored(plr_vision *v, const plr_scene *s, const plr_track *t) {
