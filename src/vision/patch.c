@@ -239,37 +239,37 @@ void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, 
 
 /* Of each sample Jx, Jy, K = (J c) o and the residual r, and the
  * upper triangle of the sums of their products without the means. */
-enum { OF_J = 0, OF_K = 2, OF_R = 4, COLUMNS = 5 };
+enum { OF_J = 0, OF_K = 2, OF_R = 4, OF_ALL = 5 };
 
-static void sum_slopes(plr_real M[COLUMNS][COLUMNS], const plr_image *image, const plr_grid *g,
+static void sum_slopes(plr_real M[OF_ALL][OF_ALL], const plr_image *image, const plr_grid *g,
                        const plr_template *t, int32_t gain, const int32_t c[2]) {
-    int64_t products[COLUMNS][COLUMNS] = {{0}};
-    int32_t sum[COLUMNS] = {0};
+    int64_t products[OF_ALL][OF_ALL] = {{0}};
+    int32_t sum[OF_ALL] = {0};
     for (int j = -HALF, k = 0; j <= HALF; j++)
         for (int i = -HALF; i <= HALF; i++, k++) {
             const int32_t I =
                 sample(image, g->x + i * g->A[0] + j * g->A[1], g->y + i * g->A[2] + j * g->A[3]);
             const int32_t along = (t->Jx[k] * c[0] + t->Jy[k] * c[1]) / (1 << FINE);
-            const int32_t column[COLUMNS] = {t->Jx[k], t->Jy[k], along * i, along * j,
-                                             gain * I / (1 << FINE) - t->T[k]};
-            for (int a = 0; a < COLUMNS; a++) {
+            const int32_t column[OF_ALL] = {t->Jx[k], t->Jy[k], along * i, along * j,
+                                            gain * I / (1 << FINE) - t->T[k]};
+            for (int a = 0; a < OF_ALL; a++) {
                 sum[a] += column[a];
                 for (int b = 0; b <= a; b++)
                     products[a][b] += (int64_t)column[a] * column[b];
             }
         }
-    for (int a = 0; a < COLUMNS; a++)
+    for (int a = 0; a < OF_ALL; a++)
         for (int b = 0; b <= a; b++)
             M[b][a] = central(products[a][b], sum[a], sum[b]);
 }
 
 /* What a column explains of those behind it is taken off. False where it explains nothing. */
-static bool eliminate(plr_real M[COLUMNS][COLUMNS], int p) {
+static bool eliminate(plr_real M[OF_ALL][OF_ALL], int p) {
     if (!(M[p][p] > 0))
         return false;
-    for (int a = p + 1; a < COLUMNS; a++) {
+    for (int a = p + 1; a < OF_ALL; a++) {
         const plr_real share = M[p][a] / M[p][p];
-        for (int b = a; b < COLUMNS; b++)
+        for (int b = a; b < OF_ALL; b++)
             M[a][b] = PLR_FMA(-share, M[p][b], M[a][b]);
     }
     return true;
@@ -280,7 +280,7 @@ bool plr_patch_slope(const plr_image *image, const plr_template *t, const plr_re
                      plr_real info[3]) {
     plr_grid g;
     plr_patch_sums p;
-    plr_real M[COLUMNS][COLUMNS];
+    plr_real M[OF_ALL][OF_ALL];
     if (!plr_grid_place(&g, image, at, A) || !(plr_abs(c[0]) < 4 && plr_abs(c[1]) < 4))
         return false;
     plr_patch_sum(&p, image, &g, t);
