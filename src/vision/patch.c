@@ -237,10 +237,10 @@ void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, 
 
 /* --- slopes --- */
 
-/* Of each sample Jx, Jy, K = (J c) o and the residual r, and the
- * upper triangle of the sums of their products without the means. */
+/* Columns of a sample: Jx, Jy, K = (J c) o and the residual r. */
 enum { OF_J = 0, OF_K = 2, OF_R = 4, OF_ALL = 5 };
 
+/* The upper triangle of M <- the sums of the columns' products, without their means. */
 static void sum_slopes(plr_real M[OF_ALL][OF_ALL], const plr_image *image, const plr_grid *g,
                        const plr_template *t, int32_t gain, const int32_t c[2]) {
     int64_t products[OF_ALL][OF_ALL] = {{0}};

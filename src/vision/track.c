@@ -219,6 +219,8 @@ void plr_track_weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
         info[i] = plr_leaky_sum(info[i], SLOPE_KEEP, fit[i]);
         all[i] = info[i] + (i == 1 ? 0 : prior);
     }
+    if (!(PLR_FMA(all[0], all[2], -(all[1] * all[1])) > PLR_R(1e-4) * all[0] * all[2]))
+        return;
     plr_solve2_symmetric(mean, all, sum);
     for (int i = 0; i < 2; i++)
         slope[i] = mean[i] > SLOPE_MOST    ? SLOPE_MOST
