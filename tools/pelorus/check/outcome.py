@@ -27,6 +27,8 @@ from pelorus.check.contents import (
     recording_of,
     scaled,
     shifted,
+    slots_in_force,
+    slots_needed,
     within,
 )
 from pelorus.check.options import Settings, options_of
@@ -101,6 +103,10 @@ class Bench:
         self._folder = folder
         self._program = program
         self._outlier_cost = outlier_cost(self.header, messages)
+        self._slots = slots_in_force(self._messages)
+        # Known landmarks take slots, too, and are not among the tracks.
+        by_map = self.holds(Kind.LANDMARK)
+        self._needed = self._slots if by_map else slots_needed(self._messages, self._slots)
         self._known: dict[tuple[tuple[str, str], ...], Outcome] = {}
         self._written: dict[tuple[str, ...], Path] = {}
 
@@ -148,6 +154,9 @@ class Bench:
         settings = dict(key)
         recording = self._recording(settings)
         wanted = {k: v for k, v in settings.items() if not k.startswith("@")}
+        slots = int(float(wanted.get("slots", self._slots)))
+        if wanted.get("mode", "slam") == "slam" and self._needed < slots:
+            wanted["slots"] = str(self._needed)
         options = options_of(wanted | {"gate-d2": GATE_D2})
         frames = stuffed_answers(self._program, recording, options)
         poses = framing.only(reversed(frames), Kind.POSE)
