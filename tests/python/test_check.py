@@ -266,13 +266,16 @@ def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
 
     good = report(1, matched=10, used=10, innovation_rows=30, innovation_d2=30.0)
     pose = Pose(1, after_stereo=True)
-    base = outcome.outcome_of([good, pose], 40.0)
+
+    def of(*reports: Report) -> outcome.Outcome:
+        frames = [framing.encode(m, 0).rstrip(b"\0") for m in reports]
+        return outcome.outcome_of(framing.rows_of(frames, Kind.REPORT), pose, 40.0)
+
+    base = of(good)
     assert base.nis == 1.0
-    worse = outcome.outcome_of([replace(good, gated=1), pose], 40.0)
-    assert worse.cost - base.cost == pytest.approx(4.0)
-    assert outcome.outcome_of([pose], 40.0) is outcome.NOTHING
-    refused = replace(good, status=-6)
-    assert outcome.outcome_of([good, refused, pose], 40.0).matched == 10
+    assert of(replace(good, gated=1)).cost - base.cost == pytest.approx(4.0)
+    assert of() is outcome.NOTHING
+    assert of(good, replace(good, status=-6)).matched == 10
 
 
 def test_any_run_is_likelier_than_one_that_used_nothing() -> None:

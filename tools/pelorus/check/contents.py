@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import takewhile
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -17,9 +16,8 @@ from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
 from pelorus.math import inertial
 from pelorus.math.inertial import Inertial
-from pelorus.wire.frames import Config, Imu, Kind, Message, Process, Reading, Start, Stereo, Twist
+from pelorus.wire.frames import Imu, Kind, Message, Process, Reading, Start, Stereo, Twist
 from pelorus.wire.framing import Writer, encode, header_of_messages
-from pelorus.wire.settings import IDS
 
 
 def recording_of(messages: Sequence[Message], process: Process | None = None) -> Recording:
@@ -79,7 +77,6 @@ def _ascending(messages: list[Timed]) -> list[Timed]:
 STEADY_NS = 2_000_000_000
 SIDES: tuple[tuple[int, Literal["left", "right"]], ...] = ((-1, "left"), (1, "right"))
 FRAMES_MOST, SEEN_MOST = 4000, 60_000  # enough to estimate the sigmas to 1 or 2 %
-USUAL_SLOTS = 100  # of a replay to which nobody gives a number
 AHEAD = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK)  # belong to every part of a recording
 
 
@@ -95,33 +92,6 @@ def first_frames(messages: Sequence[Message], most: int = FRAMES_MOST) -> list[M
         if message.kind not in (Kind.END, Kind.TRUTH, Kind.TEXT, Kind.STATE):
             out.append(message)
     return out
-
-
-def slots_in_force(messages: Sequence[Message]) -> int:
-    """Returns the slots that a replay without settings of its own has."""
-    id = IDS["slots"]
-    asked = [m.settings[id] for m in messages if isinstance(m, Config) and id in m.settings]
-    return int(asked[-1]) if asked else USUAL_SLOTS
-
-
-def slots_needed(messages: Sequence[Message], most: int) -> int:
-    """Returns the fewest slots, up to `most`, in which a filter keeps every landmark seen again.
-
-    The landmark unseen for longest is evicted first. One that is never seen again says nothing
-    about the others, but its rows of P cost as much as theirs.
-    """
-    needed, last_seen = 1, dict[int, int]()  # ordered by the frame of the last sighting
-    frames = (m.ids.tolist() for m in messages if isinstance(m, Stereo))
-    for frame, ids in enumerate(frames):
-        since = min((last_seen.get(id, frame) for id in ids), default=frame)
-        kept = sum(1 for _ in takewhile(lambda at: at >= since, reversed(last_seen.values())))  # noqa: B023 - used at once
-        needed = max(needed, len(ids), kept)
-        if needed >= most:
-            return most
-        for id in ids:
-            last_seen.pop(id, None)
-            last_seen[id] = frame
-    return needed
 
 
 def half(messages: Sequence[Message], which: int) -> list[Message]:
