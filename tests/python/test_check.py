@@ -6,6 +6,7 @@ is not there is not claimed.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,13 +20,14 @@ from pelorus.check import (
     outcome,
     parameters,
     search,
+    slots,
     tracks_noise,
     tuning,
     tuning_imu,
     verdict,
 )
 from pelorus.check.biases import common_bias
-from pelorus.check.contents import Frames, first_frames, half, recording_of, shifted
+from pelorus.check.contents import first_frames, half, recording_of, shifted
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
 from pelorus.errors import PelorusError
@@ -34,6 +36,7 @@ from pelorus.math import inertial
 from pelorus.math.inertial import Inertial
 from pelorus.wire import framing
 from pelorus.wire.frames import (
+    Config,
     Header,
     Imu,
     Kind,
@@ -45,6 +48,7 @@ from pelorus.wire.frames import (
     Stereo,
     Twist,
 )
+from pelorus.wire.settings import IDS
 from replay_drive import BIN, CAMERA, drive, header
 from report_runs import built_programs
 
@@ -104,7 +108,7 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
 def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) -> None:
     messages = framing.messages_of(simulated)
     late = tmp_path / "late.plr"
-    Frames([]).write(
+    framing.write_file(
         late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS)
     )
     bench = Bench(built_programs().float32, late, tmp_path)
@@ -139,7 +143,7 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
 ) -> None:
     early = tmp_path / "early.plr"
     messages = [m for m in framing.messages_of(flown) if m.kind not in (Kind.END, Kind.TRUTH)]
-    Frames([]).write(early, shifted(messages, -20 * MS))
+    framing.write_file(early, shifted(messages, -20 * MS))
     wrong = {"pixel-sigma": "2", "gyro-noise": "0.0005", "accel-noise": "0.3"}
     sets = [word for name, value in wrong.items() for word in ("--set", f"{name}={value}")]
     conf = tmp_path / "tuned.conf"
@@ -276,6 +280,37 @@ def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
     assert of(replace(good, gated=1)).cost - base.cost == pytest.approx(4.0)
     assert of() is outcome.NOTHING
     assert of(good, replace(good, status=-6)).matched == 10
+
+
+def seen(*frames: Sequence[int]) -> list[Message]:
+    return [
+        Stereo(k, np.array(ids, np.uint32), np.zeros((len(ids), 4), np.float32))
+        for k, ids in enumerate(frames)
+    ]
+
+
+def test_slots_are_needed_for_what_is_in_sight_or_comes_back() -> None:
+    assert slots.needed(seen([1, 2], [2, 3], [3, 4, 5]), 100) == 3  # who has gone needs none
+    assert slots.needed(seen([1, 2], [3], [4, 5], [2]), 100) == 5  # 2 must not be evicted for 5
+    assert slots.needed(seen([1, 2], [3], [4, 5], [2]), 4) == 4
+    assert slots.needed(seen([]), 100) == 1
+    asked = Config({IDS["slots"]: 20.0})
+    assert slots.Slots([asked, *seen([1, 2])]).sparing({}) == {"slots": "2"}
+    assert slots.Slots([asked, *seen(range(30))]).sparing({}) == {}
+    assert slots.Slots(seen([1, 2])).sparing({"slots": "1"}) == {"slots": "1"}
+    assert slots.Slots(seen([1, 2])).sparing({"mode": "mapping"}) == {"mode": "mapping"}
+
+
+def test_landmarks_that_never_return_change_no_likelihood(
+    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = built_programs().float32
+    few = Bench(program, simulated, tmp_path).run({})
+    monkeypatch.setattr(slots.Slots, "sparing", lambda _, settings: settings)
+    all_of_them = Bench(program, simulated, tmp_path).run({})
+    assert (few.matched, few.frames) == (all_of_them.matched, all_of_them.frames)
+    assert few.cost == pytest.approx(all_of_them.cost, abs=1e-3)
+    assert few.bias == pytest.approx(all_of_them.bias, abs=1e-3)
 
 
 def test_any_run_is_likelier_than_one_that_used_nothing() -> None:
@@ -468,7 +503,7 @@ def test_a_recording_with_nothing_to_check_says_what_it_lacks(
     tmp_path: Path, pelorus: Run, kind: type[Message]
 ) -> None:
     path = tmp_path / "x.plr"
-    Frames([]).write(path, [m for m in drive(5) if not isinstance(m, kind)])
+    framing.write_file(path, [m for m in drive(5) if not isinstance(m, kind)])
     said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN, status=1)
     assert ("no twists" if kind is Twist else "no stereo frames") in said.err
     assert not (tmp_path / "t.conf").exists()
@@ -481,9 +516,19 @@ def test_a_folder_is_refused_with_what_would_be_right(tmp_path: Path, pelorus: R
     assert not (tmp_path / "t.conf").exists()
 
 
+def test_an_unknown_setting_is_refused_by_the_recordings_name(tmp_path: Path, pelorus: Run) -> None:
+    path = tmp_path / "x.plr"
+    framing.write_file(path, drive(30))
+    options = ("--set", "unknown=1", "--out", tmp_path / "t.conf", "--bin", BIN)
+    said = pelorus("check", path, *options, status=1)
+    assert "--unknown: unknown option" in said.err
+    assert "".join(said.err.split()).startswith(f"error:{path}:")
+    assert "tuning" not in said.err
+
+
 def test_a_settings_file_that_is_none_is_refused_by_line(tmp_path: Path, pelorus: Run) -> None:
     path, conf = tmp_path / "x.plr", tmp_path / "bad.conf"
-    Frames([]).write(path, drive(5))
+    framing.write_file(path, drive(5))
     conf.write_text("# mine\npixel-sigma 2\n", encoding="utf-8")
     said = pelorus(
         "check", path, "--config", conf, "--out", tmp_path / "t.conf", "--bin", BIN, status=1

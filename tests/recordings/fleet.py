@@ -37,7 +37,7 @@ MISHAPS: tuple[tuple[str, ...], ...] = (
     (),
     ("--frozen-from", "2", "--frozen-for", "1"),
     ("--dead-encoder-from", "2", "--dead-encoder-for", "1"),
-    ("--imu-rate", "50", "--rest", "1"),
+    ("--imu-rate", "100", "--rest", "1"),
 )
 DAMAGE_EVERY = 9001  # bytes
 

@@ -31,6 +31,7 @@ from pelorus.check.contents import (
 )
 from pelorus.check.options import Settings, options_of
 from pelorus.check.slots import Slots
+from pelorus.errors import PelorusError
 from pelorus.io.trajectory import POSE_SIZE
 from pelorus.native.replay import stuffed_answers, threads
 from pelorus.program.console import progress
@@ -101,7 +102,7 @@ class Bench:
         part = within(first_frames(messages), round(OFFSET_MOST_S * 1e9))
         self._messages = not_before(part, BEGIN_NS)
         self._frames = Frames(self._messages)
-        self._folder = folder
+        self._source, self._folder = recording, folder
         self._program = program
         self._outlier_cost = outlier_cost(self.header, messages)
         self._slots = Slots(self._messages)
@@ -153,7 +154,11 @@ class Bench:
         recording = self._recording(settings)
         wanted = {k: v for k, v in settings.items() if not k.startswith("@")}
         options = options_of(self._slots.sparing(wanted) | {"gate-d2": GATE_D2})
-        frames = stuffed_answers(self._program, recording, options)
+        try:
+            frames = stuffed_answers(self._program, recording, options)
+        except PelorusError as error:
+            words = str(error).replace(str(recording), str(self._source))
+            raise PelorusError(words) from error
         poses = framing.only(reversed(frames), Kind.POSE)
         last = next((m for m in poses if isinstance(m, Pose) and m.after_stereo), None)
         return outcome_of(framing.rows_of(frames, Kind.REPORT), last, self._outlier_cost)

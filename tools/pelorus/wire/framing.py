@@ -246,10 +246,11 @@ class Writer:
         self.write(end_of(self._counts, heard))
 
 
-def write_file(path: Path, messages: Iterable[Message], count: int) -> int:
+def write_file(path: Path, messages: Iterable[Message], count: int | None = None) -> int:
     """Writes the whole file, packed if its name says so; returns its size in bytes.
 
-    Nothing remains if that fails. `count` is the number of messages, for the progress.
+    Nothing remains if that fails. `count` is the number of messages, if known, for the
+    progress.
     """
     with whole(path) as (part,), writing(path):
         with closing(packed_file.create(part, packed_file.is_packed(path))) as stream:
