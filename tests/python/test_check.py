@@ -6,7 +6,6 @@ is not there is not claimed.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +19,6 @@ from pelorus.check import (
     outcome,
     parameters,
     search,
-    slots,
     tracks_noise,
     tuning,
     tuning_imu,
@@ -36,19 +34,18 @@ from pelorus.math import inertial
 from pelorus.math.inertial import Inertial
 from pelorus.wire import framing
 from pelorus.wire.frames import (
-    Config,
     Header,
     Imu,
     Kind,
     Message,
     Noise,
+    Pose,
     Reading,
     Report,
     Start,
     Stereo,
     Twist,
 )
-from pelorus.wire.settings import IDS
 from replay_drive import BIN, CAMERA, drive, header
 from report_runs import built_programs
 
@@ -106,11 +103,10 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
 
 
 def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) -> None:
-    messages = framing.messages_of(simulated)
     late = tmp_path / "late.plr"
-    framing.write_file(
-        late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS)
-    )
+    messages = framing.messages_of(simulated)
+    kept = [m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)]
+    framing.write_file(late, shifted(kept, 50 * MS))
     bench = Bench(built_programs().float32, late, tmp_path)
     true = {"pixel-sigma": "1.5", "velocity-sigma": "0.3", "gyro-sigma": "0.03"}
     offset = clock.of_twists(bench, true)
@@ -266,8 +262,6 @@ def report(t: int, **counts: float) -> Report:
 
 
 def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
-    from pelorus.wire.frames import Pose  # noqa: PLC0415 - only here
-
     good = report(1, matched=10, used=10, innovation_rows=30, innovation_d2=30.0)
     pose = Pose(1, after_stereo=True)
 
@@ -280,37 +274,6 @@ def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
     assert of(replace(good, gated=1)).cost - base.cost == pytest.approx(4.0)
     assert of() is outcome.NOTHING
     assert of(good, replace(good, status=-6)).matched == 10
-
-
-def seen(*frames: Sequence[int]) -> list[Message]:
-    return [
-        Stereo(k, np.array(ids, np.uint32), np.zeros((len(ids), 4), np.float32))
-        for k, ids in enumerate(frames)
-    ]
-
-
-def test_slots_are_needed_for_what_is_in_sight_or_comes_back() -> None:
-    assert slots.needed(seen([1, 2], [2, 3], [3, 4, 5]), 100) == 3  # who has gone needs none
-    assert slots.needed(seen([1, 2], [3], [4, 5], [2]), 100) == 5  # 2 must not be evicted for 5
-    assert slots.needed(seen([1, 2], [3], [4, 5], [2]), 4) == 4
-    assert slots.needed(seen([]), 100) == 1
-    asked = Config({IDS["slots"]: 20.0})
-    assert slots.Slots([asked, *seen([1, 2])]).sparing({}) == {"slots": "2"}
-    assert slots.Slots([asked, *seen(range(30))]).sparing({}) == {}
-    assert slots.Slots(seen([1, 2])).sparing({"slots": "1"}) == {"slots": "1"}
-    assert slots.Slots(seen([1, 2])).sparing({"mode": "mapping"}) == {"mode": "mapping"}
-
-
-def test_landmarks_that_never_return_change_no_likelihood(
-    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = built_programs().float32
-    few = Bench(program, simulated, tmp_path).run({})
-    monkeypatch.setattr(slots.Slots, "sparing", lambda _, settings: settings)
-    all_of_them = Bench(program, simulated, tmp_path).run({})
-    assert (few.matched, few.frames) == (all_of_them.matched, all_of_them.frames)
-    assert few.cost == pytest.approx(all_of_them.cost, abs=1e-3)
-    assert few.bias == pytest.approx(all_of_them.bias, abs=1e-3)
 
 
 def test_any_run_is_likelier_than_one_that_used_nothing() -> None:
@@ -523,7 +486,6 @@ def test_an_unknown_setting_is_refused_by_the_recordings_name(tmp_path: Path, pe
     said = pelorus("check", path, *options, status=1)
     assert "--unknown: unknown option" in said.err
     assert "".join(said.err.split()).startswith(f"error:{path}:")
-    assert "tuning" not in said.err
 
 
 def test_a_settings_file_that_is_none_is_refused_by_line(tmp_path: Path, pelorus: Run) -> None:

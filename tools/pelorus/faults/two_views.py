@@ -63,7 +63,7 @@ def two_views(tracks: Tracks, camera: Camera, lag: int) -> TwoViews:
     """
     digest = sha256(repr((camera, lag, tracks.frame_count)).encode())
     for column in (tracks.frame, tracks.id, tracks.pixels):
-        digest.update(np.ascontiguousarray(column))
+        digest.update(np.ascontiguousarray(column).data)
     key = digest.digest()
     found = _known.pop(key, None)
     _known[key] = found = _estimated(tracks, camera, lag) if found is None else found
