@@ -31,7 +31,6 @@ from numpy.typing import NDArray
 
 from pelorus.check.contents import AHEAD, Frames, recording_of
 from pelorus.check.options import Settings, options_of
-from pelorus.check.slots import Slots
 from pelorus.evaluate.evaluation import world_laid
 from pelorus.io.tracks import Tracks
 from pelorus.io.trajectory import Trajectory, estimate_in
@@ -105,7 +104,6 @@ class _Part(NamedTuple):
     window: int
     way: str  # empty: all points
     path: Path
-    slots: Slots
 
 
 # Both halves share every error of the calibration, so its sigmas are off here.
@@ -135,13 +133,13 @@ class Parts:
     def _add(self, k: int, way: str, messages: list[Message], frames: Frames) -> None:
         path = self._folder / f"part-{len(self._parts)}.plr"
         frames.write(path, messages)
-        self._parts.append(_Part(k, way, path, Slots(messages)))
+        self._parts.append(_Part(k, way, path))
 
     def apart(self, settings: Settings) -> HalvesApart:
         """Returns how far apart halves are with these settings, by windows with enough data."""
-        same = {**settings, **SAME_CAMERA}
+        options = options_of({**settings, **SAME_CAMERA})
         with ThreadPoolExecutor(threads()) as pool:
-            ran = pool.map(lambda part: self._estimate(part, same), self._parts)
+            ran = pool.map(lambda part: self._estimate(part, options), self._parts)
             estimates = list(progress(ran, "halves of the points", len(self._parts)))
         whole = {p.window: e for p, e in zip(self._parts, estimates, strict=True) if not p.way}
         compared: dict[tuple[str, int], list[tuple[float, int]]] = {}
@@ -160,8 +158,7 @@ class Parts:
             min(map(len, ratios.values()), default=0),
         )
 
-    def _estimate(self, part: _Part, settings: Settings) -> Estimate | None:
-        options = options_of(part.slots.sparing(settings))
+    def _estimate(self, part: _Part, options: Sequence[str]) -> Estimate | None:
         try:
             answers = stuffed_answers(self._program, part.path, options)
         except NothingUsefulError:  # not one frame of so short a part could be used
