@@ -21,7 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 INCLUDE = re.compile(
-    r'^[ \t]*#[ \t]*include[ \t]+(?:"([^"]+)"|(PLR_TILE_FILE|PLR_ROW_FILE))[^\n]*\n', re.M
+    r'^[ \t]*#[ \t]*include[ \t]+(?:"([^"]+)"|(PLR_(?:TILE|ROW|PIXELS)_FILE))[^\n]*\n', re.M
 )
 COMMENT_OR_TEXT = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.S)
 SPDX = re.compile(r"^// SPDX[^\n]*\n")
@@ -45,6 +45,7 @@ ROOMS = {
 CHOICES = {
     "PLR_TILE_FILE": ("PLR_TILE_CORTEX_M", "math/tile_cortex_m.h", "math/tile_in_c.h"),
     "PLR_ROW_FILE": ("PLR_WASM_FMA", "math/row_wasm.h", "math/row_in_c.h"),
+    "PLR_PIXELS_FILE": ("PLR_PIXELS_MVE", "vision/kernels_mve.h", "vision/kernels_in_c.h"),
 }
 
 HEAD = """\

@@ -4,7 +4,7 @@
 #
 # usage: tools/flash.sh [IMAGE] [--probe stlink|cmsis-dap|jlink]
 #
-# IMAGE is a .bin or .elf of an STM32F405, by default
+# IMAGE is a .bin or .elf of an STM32F405 or STM32H743, by default
 # build/robot/images/pelorus-stm32f405-n32. st-flash is taken where it is installed and the probe is
 # an ST-Link, else OpenOCD.
 #
@@ -48,8 +48,9 @@ esac
 [ -r "$image.bin" ] && [ -r "$image.elf" ] ||
     die "$image.bin or .elf is not there: tools/robot-demo.sh stm32f405 builds it"
 case $(basename "$image") in
-*stm32f405*) ;;
-*) die "$(basename "$image") is not for the STM32F405; an MPS board takes its image from its SD card" ;;
+*stm32f405*) target=stm32f4x ;;
+*stm32h743*) target=stm32h7x ;;
+*) die "$(basename "$image") is not for an STM32F405 or STM32H743; an MPS board takes its image from its SD card" ;;
 esac
 
 echo 'Not tried on hardware: watch what happens.'
@@ -57,5 +58,5 @@ if [ "$probe" = stlink ] && command -v st-flash >/dev/null; then
     exec st-flash --reset write "$image.bin" "$FLASH_START"
 fi
 command -v openocd >/dev/null || die 'neither st-flash nor openocd is installed (Debian: stlink-tools, openocd)'
-exec openocd -f "interface/$probe.cfg" -f target/stm32f4x.cfg \
+exec openocd -f "interface/$probe.cfg" -f "target/$target.cfg" \
     -c "program $image.elf verify reset exit"

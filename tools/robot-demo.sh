@@ -7,7 +7,7 @@
 # usage: tools/robot-demo.sh [BOARD [RECORDING.plr]]
 #        tools/robot-demo.sh --pictures [BOARD]
 #
-# With --pictures the board (stm32f405 or mps2_an500) has eyes, and pictures of a drive in its image: each pair's
+# With --pictures the board (stm32f405, mps2_an500 or mps3_an547) has eyes, and pictures of a drive in its image: each pair's
 # observations and pose are compared, and instructions are counted.
 # BOARD is stm32f405 (the default), mps2_an386, mps2_an500 or mps3_an547. The flight log is left in
 # out/flight-BOARD.plr, the firmware in build/robot/images.

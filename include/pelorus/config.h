@@ -22,7 +22,7 @@ extern "C" {
 /* Increases with every change of the source that changes the bits of a result. It is part of the
  * build fingerprint, so a log shows whether it was made by the same arithmetic as this source's.
  * tests/golden fails if the bits change and this number does not. */
-#define PLR_ARITHMETIC 24
+#define PLR_ARITHMETIC 25
 
 /* Precision of the filter's arithmetic: 32 (float; default) or 64 (double). For the model `body`
  * float is as accurate (docs/NUMERICS.md) and takes half the RAM; choose 64 for `world`. */
@@ -124,6 +124,16 @@ extern "C" {
 #else
 #define PLR_WASM_FMA 0
 #define PLR_ROW_FILE "math/row_in_c.h"
+#endif
+
+/* Eyes' loops over pixels: in the integer vectors of a Cortex-M55 where the compiler may use them, else in C. They
+ * change no bit. */
+#if defined(__ARM_FEATURE_MVE) && !PLR_PORTABLE
+#define PLR_PIXELS_MVE  1
+#define PLR_PIXELS_FILE "vision/kernels_mve.h"
+#else
+#define PLR_PIXELS_MVE  0
+#define PLR_PIXELS_FILE "vision/kernels_in_c.h"
 #endif
 
 #if defined(__FAST_MATH__)

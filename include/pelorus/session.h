@@ -231,6 +231,11 @@ plr_step plr_session_step(plr_session *s);
  * filter; else what plr_vision_track says, or PLR_E_CALIBRATION, _RANGE the cameras: answered as an IMAGE. */
 plr_status plr_session_look(plr_session *s, const struct plr_picture_pair *pair);
 
+/* A reading of the program's own IMU, between two steps: used as if it had come in an IMU message, which has
+ * float32. PLR_E_ARGUMENT a null pointer; PLR_E_NOT_READY before a HEADER, or its settings make no filter: nothing
+ * is done. What else is wrong is answered as to an IMU message. */
+plr_status plr_session_inertial(plr_session *s, plr_time_ns t_ns, const plr_imu *reading);
+
 /* Does what END does, for a stream that stopped without one: applies the twists that still wait,
  * sends the landmarks in the filter, and END. The next HEADER starts a new drive. */
 void plr_session_finish(plr_session *s);

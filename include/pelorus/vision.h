@@ -113,8 +113,7 @@ typedef struct plr_vision_report {
         swapped; /* points are found where the other side should be: left and right are exchanged */
     uint16_t followed; /* tracks that were found again in the left picture */
     uint16_t
-        observed; /* and in the right one: these, and the born, are handed out, but for those whose rows
-                          differ by half a pixel more or less than the pair's median */
+        observed; /* and in the right one, where rows agree: these and the born are handed out */
     uint16_t born;
     uint16_t corners;  /* tried as births */
     uint16_t cut_anew; /* patches that had become too different from those of their births */
@@ -163,6 +162,7 @@ typedef struct plr_track {
     plr_real A[4];          /* from the patch to the left picture as it is now */
     plr_real cov[3];        /* of `at`, xx xy yy, from the last fit */
     plr_real var_right;     /* of uR beside uL */
+    plr_real row_gap;       /* by how much its right row is lower, px of the virtual camera */
     plr_real var_cut;       /* what cutting anew has cost, px^2 */
     plr_real likeness;
     uint8_t patch[PLR_VISION_LEVELS][PLR_PATCH_BYTES];

@@ -11,6 +11,7 @@
 #include "pelorus/session.h"
 #include "pelorus/state_store.h"
 #include "port_serial.h"
+#include "sensors.h"
 #include "serial.h"
 #include "startup.h"
 #include "telemetry.h"
@@ -22,11 +23,11 @@ enum { KNOWN_LANDMARKS = 64 };
 static plr_session session;
 static plr_landmark known[KNOWN_LANDMARKS];
 static plr_state_store store;
+static plr_message message; /* the firmware's own */
 
 /* The first frames after a reset. A host that receives the REPORT during a drive knows that the board
  * has lost its state; the TEXT tells people the name of the board, its build, and why it started. */
 static void announce(void) {
-    static plr_message message;
     static text words;
     const uint8_t delimiter = 0; /* ends a frame that the reset may have cut */
     (void)serial_write(&serial_link, &delimiter, 1);
@@ -49,6 +50,17 @@ static void announce(void) {
     (void)plr_writer_put(&session.writer, &message);
 }
 
+/* Cameras and IMU of the board's own: what is wrong with them people are told. */
+static void start_sensors(void) {
+    const char *trouble = sensors_start();
+    if (trouble != NULL) {
+        message.kind = PLR_KIND_TEXT;
+        message.as.text.severity = PLR_SEVERITY_ERROR;
+        strncpy(message.as.text.text, trouble, PLR_WIRE_MAX_TEXT);
+        (void)plr_writer_put(&session.writer, &message);
+    }
+}
+
 /* Where a state is kept, or NULL where the board has no such place. */
 static plr_state_store *storage(void) {
     plr_block_device device;
@@ -69,12 +81,15 @@ int main(void) {
     options.known_capacity = KNOWN_LANDMARKS;
     options.store = storage();
     options.eyes = firmware_eyes();
+    options.output |= sensors_output;
     options.observer = telemetry_observer(&session);
     if (plr_session_init(&session, &port, &options) != PLR_OK) {
         return 1; /* startup resets the board: only a broken build comes here */
     }
     announce();
+    start_sensors();
     for (;;) {
         (void)plr_session_step(&session);
+        sensors_step(&session);
     }
 }

@@ -9,7 +9,7 @@ typedef struct replay_options {
     const char *input;                     /* "-" is the standard input; NULL if none was given */
     const char *config, *trajectory, *out; /* paths, NULL where not wanted */
     const char *map_in, *load_state, *save_state;
-    bool print_config, json, force, quiet, help, version;
+    bool print_config, answers, json, force, quiet, help, version;
 
     /* From config file and command line, in the order of their precedence. */
     plr_wire_setting overrides[4 * SETTING_LIST_MAX];

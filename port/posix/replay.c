@@ -194,7 +194,10 @@ static plr_status start_session(replay *run) {
     options.override_count = run->options.override_count;
     options.start = run->options.start;
     options.deadline_us = run->options.deadline_us;
-    options.output |= PLR_OUTPUT_ECHO | PLR_OUTPUT_EVIDENCE;
+    if (run->options.answers)
+        options.output = PLR_OUTPUT_POSE | PLR_OUTPUT_REPORT;
+    else
+        options.output |= PLR_OUTPUT_ECHO | PLR_OUTPUT_EVIDENCE;
     options.left_out = run->options.left_out;
     options.eyes = pictures_eyes();
     options.known = run->known;

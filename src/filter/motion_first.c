@@ -161,18 +161,25 @@ static plr_real residual_norm2(const plr_search *s, unsigned i) {
     return plr_stereo_residual2(plr_search_row(s, i)->seen, r);
 }
 
+/* d^2 of an observation for the gate: about the motion that the others give, or, where they say too little or
+ * none was found (U is NULL), about the prediction. */
+static plr_real gate_d2(const plr_search *s, unsigned i, const plr_real *U,
+                        const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real *share) {
+    const plr_residual *at = &s->residuals[i];
+    const plr_real without_it = U ? leave_one_out(at, U, dz, e, share) : at->prior_d2;
+    return (*share >= LEAST_SHARE ? without_it : at->prior_d2) +
+           plr_stereo_row_gap_d2(&s->f->camera, plr_search_row(s, i)->seen);
+}
+
 /* What the gate says of an observation, with its d^2. Adds the innovation of an accepted one to its track. */
-static plr_gate_result judge(plr_search *s, unsigned i, bool found, const plr_real *U,
+static plr_gate_result judge(plr_search *s, unsigned i, const plr_real *U,
                              const plr_real dz[PLR_POSE_DIM], plr_real *judged_d2) {
     const plr_residual *at = &s->residuals[i];
-    plr_real d2 = *judged_d2 = at->prior_d2, e[3], share = 0;
-    if (!(d2 >= 0) || at->behind)
+    plr_real e[3], share = 0;
+    *judged_d2 = at->prior_d2;
+    if (!(at->prior_d2 >= 0) || at->behind)
         return PLR_GATE_REJECTED;
-    if (found) {
-        const plr_real without_it = leave_one_out(at, U, dz, e, &share);
-        d2 = share >= LEAST_SHARE ? without_it : d2;
-    }
-    *judged_d2 = d2 += plr_stereo_row_gap_d2(&s->f->camera, plr_search_row(s, i)->seen);
+    const plr_real d2 = *judged_d2 = gate_d2(s, i, U, dz, e, &share);
     const bool accepted = plr_gate_accepts(s->f, s->opens_fixed_gate, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
@@ -354,8 +361,50 @@ static unsigned enter(plr_search *s) {
     return unknown;
 }
 
+/* The factor of the sums at the best point, and the step that they would go next. */
+static bool solve(const plr_search_point *best, plr_real *U, plr_real dz[PLR_POSE_DIM]) {
+    if (!plr_search_factorise(best, 0, U))
+        return false;
+    (void)plr_search_step(best, U, dz);
+    return true;
+}
+
+/* Trims what the gate rejects at the best point. True if that is not what was trimmed before, and the others
+ * are most of all and tell a motion alone: what most reject is not the motion, and few fit anything. */
+static bool trim_rejected(plr_search *s, const plr_real *U, const plr_real dz[PLR_POSE_DIM]) {
+    unsigned active = 0, rejected = 0;
+    bool changed = false;
+    for (unsigned i = 0; i < s->count; i++) {
+        plr_residual *at = &s->residuals[i];
+        plr_real e[3], share = 0;
+        if (!(at->active > 0))
+            continue;
+        const bool accepted =
+            !at->behind && plr_gate_accepts(s->f, s->opens_fixed_gate,
+                                            gate_d2(s, i, U, dz, e, &share), residual_norm2(s, i));
+        changed = changed || accepted == at->trimmed;
+        at->trimmed = !accepted;
+        rejected += !accepted;
+        active++;
+    }
+    return changed && 2 * rejected < active && active - rejected >= MIN_AGREEING;
+}
+
+/* Goes on without what the gate rejects, at most twice: Huber's function bounds the pull of a point and does
+ * not end it, so that many that move alike pull the motion aside until the others are rejected, too.
+ * U and dz are of the result. False if its sums have no factor. */
+static bool search_without_rejected(plr_search *s, plr_search_point *best, plr_real *U,
+                                    plr_real dz[PLR_POSE_DIM]) {
+    bool found = solve(best, U, dz);
+    for (unsigned again = 0; found && again < MORE_SEARCHES && trim_rejected(s, U, dz); again++) {
+        plr_search_without_trimmed(s, best);
+        found = solve(best, U, dz);
+    }
+    return found;
+}
+
 /* Judges every row at the result of the search, and says where its landmark is to be linearised. */
-static void judge_all(plr_search *s, bool found, const plr_real *U, const plr_real dz[PLR_POSE_DIM],
+static void judge_all(plr_search *s, const plr_real *U, const plr_real dz[PLR_POSE_DIM],
                       plr_sightings *sightings) {
     plr_filter *f = s->f;
     const plr_real usual = plr_linearisation_usual(f);
@@ -364,7 +413,7 @@ static void judge_all(plr_search *s, bool found, const plr_real *U, const plr_re
         plr_sighting *row = &sightings->at[at->row];
         plr_linearised *own = &sightings->of_slot[row->slot];
         plr_slot *slot = plr_slot_of(&f->belief, row);
-        const plr_gate_result result = judge(s, i, found, U, dz, &own->d2);
+        const plr_gate_result result = judge(s, i, U, dz, &own->d2);
         const bool accepted = result == PLR_GATE_ACCEPTED;
         const bool lost = !accepted && has_drifted(s, i);
         row->verdict = (uint8_t)(lost ? PLR_GATE_LOST : result);
@@ -403,9 +452,7 @@ void plr_motion_find(plr_filter *f, plr_sightings *sightings, const plr_picture_
         misfit = plr_exclusion_misfit(s.left_out, &all, plr_norm2_of_6(best.z));
     }
     first->outright = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
-    found = found && plr_search_factorise(&best, 0, U);
-    if (found)
-        (void)plr_search_step(&best, U, dz);
+    found = found && search_without_rejected(&s, &best, U, dz);
     plr_motion_at(&f->motion, &s.prior, best.z, &first->motion);
-    judge_all(&s, found, U, dz, sightings);
+    judge_all(&s, found ? U : NULL, dz, sightings);
 }

@@ -122,6 +122,10 @@ static plr_real d2_by_best_covariance(const plr_residual *at, unsigned best) {
     return plr_dot3(r, r);
 }
 
+static plr_real huber_weight(plr_real d2) {
+    return d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2);
+}
+
 /* J += w a^T a, b += w a^T e */
 static void add_to_sums(const plr_residual *at, plr_search_point *point) {
     plr_real *J = point->J;
@@ -173,9 +177,9 @@ static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_sear
             continue;
         }
         const plr_real d2 = plr_dot3(at->e, at->e);
-        at->weight = at->active * (d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2));
         if (!(at->active > 0) || at->trimmed)
             continue;
+        at->weight = huber_weight(d2);
         change += huber(d2_by_best_covariance(at, s->current)) - at->cost;
         add_to_sums(at, point);
     }
@@ -287,6 +291,19 @@ void plr_search_concentrate(plr_search *s, plr_search_point *best) {
     for (unsigned i = 0; i < s->count; i++)
         s->residuals[i].trimmed = false;
     plr_search_again(s, best);
+}
+
+void plr_search_without_trimmed(plr_search *s, plr_search_point *best) {
+    memset(best->J, 0, sizeof best->J);
+    memset(best->b, 0, sizeof best->b);
+    for (unsigned i = 0; i < s->count; i++) {
+        plr_residual *at = &s->residuals[i];
+        const bool counts = at->active > 0 && !at->trimmed && !at->behind;
+        at->weight = counts ? huber_weight(plr_dot3(at->e, at->e)) : PLR_R(0);
+        if (counts)
+            add_to_sums(at, best);
+    }
+    plr_search_descend(s, best);
 }
 
 void plr_search_from_zero(plr_search *s, plr_search_point *best) {

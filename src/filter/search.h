@@ -81,6 +81,9 @@ void plr_search_descend(plr_search *s, plr_search_point *best);
  * trimmed squares). At the end all residuals are evaluated at the best point. */
 void plr_search_concentrate(plr_search *s, plr_search_point *best);
 
+/* Takes the trimmed observations out of the sums of `best`, and descends from there without them. */
+void plr_search_without_trimmed(plr_search *s, plr_search_point *best);
+
 /* Evaluates all residuals at nu = z, which becomes the best point. */
 void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best);
 

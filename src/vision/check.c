@@ -2,6 +2,7 @@
 #include "vision/watch.h"
 
 #include "math/finite.h"
+#include "math/validate.h"
 
 enum { SIDE_MIN = 48, SIDE_MAX = 4096 };
 
@@ -11,21 +12,6 @@ enum { SIDE_MIN = 48, SIDE_MAX = 4096 };
 #define MOTION_MAX_M   100.0
 #define SPEED_MAX_MPS  1e3
 #define RATE_MAX_RADPS 100.0
-#define ORTHONORMAL    1e-3
-
-static bool is_rotation(const double R[9]) {
-    for (int i = 0; i < 3; i++)
-        for (int j = i; j < 3; j++) {
-            const double dot =
-                R[3 * i] * R[3 * j] + R[3 * i + 1] * R[3 * j + 1] + R[3 * i + 2] * R[3 * j + 2];
-            const double off = dot - (i == j ? 1.0 : 0.0);
-            if (!(off < ORTHONORMAL && off > -ORTHONORMAL))
-                return false;
-        }
-    const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
-                       R[2] * (R[3] * R[7] - R[4] * R[6]);
-    return det > 0;
-}
 
 static plr_status check_lens(const plr_lens *lens) {
     if (lens->model > PLR_LENS_EQUIDISTANT || lens->width_px < SIDE_MIN ||
@@ -53,7 +39,7 @@ plr_status plr_check_rig(const plr_rig *rig) {
         !plr_all_finite(&rig->fx_px, 4))
         return PLR_E_NOT_FINITE;
     const bool own = rig->fx_px != 0;
-    if (!is_rotation(rig->T_RL.R) || !plr_all_within(rig->T_RL.p, 3, FAR) ||
+    if (!plr_is_rotation(rig->T_RL.R) || !plr_all_within(rig->T_RL.p, 3, FAR) ||
         (own && (rig->fx_px < 1 || rig->fy_px < 1 || !plr_all_within(&rig->fx_px, 4, FAR))))
         return PLR_E_CALIBRATION;
     return PLR_OK;
@@ -83,7 +69,7 @@ plr_status plr_check_expected(const plr_expected *e) {
     if (!plr_all_finite(e->motion.R, 9) || !plr_all_finite(e->motion.p, 3) ||
         (moves && !(plr_all_finite(e->v_C_mps, 3) && plr_all_finite(e->w_C_radps, 3))))
         return PLR_E_NOT_FINITE;
-    if (!is_rotation(e->motion.R) || !plr_all_within(e->motion.p, 3, MOTION_MAX_M) ||
+    if (!plr_is_rotation(e->motion.R) || !plr_all_within(e->motion.p, 3, MOTION_MAX_M) ||
         (moves && !(plr_all_within(e->v_C_mps, 3, SPEED_MAX_MPS) &&
                     plr_all_within(e->w_C_radps, 3, RATE_MAX_RADPS))))
         return PLR_E_RANGE;

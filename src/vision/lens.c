@@ -3,6 +3,7 @@
 
 #include "math/small.h"
 #include "math/so3.h"
+#include "math/two.h"
 
 enum { NEWTON_STEPS = 12 };
 
@@ -30,23 +31,21 @@ static void distort(const plr_real k[8], const plr_real x[2], plr_real d[2], plr
 
 /* Whether the formula is still one to one: where its Jacobian has lost its sign, it has folded. */
 static bool unfolded(const plr_real J[4]) {
-    return PLR_FMA(J[0], J[3], -(J[1] * J[2])) > PLR_R(1e-3) && J[0] + J[3] > 0;
+    return plr_det2(J) > PLR_R(1e-3) && J[0] + J[3] > 0;
 }
 
 /* x with distort(x) = d, by Newton's method from d. */
 static bool undistort(const plr_real k[8], const plr_real d[2], plr_real x[2]) {
     x[0] = d[0], x[1] = d[1];
     for (int step = 0; step < NEWTON_STEPS; step++) {
-        plr_real found[2], J[4];
+        plr_real found[2], J[4], by[2];
         distort(k, x, found, J);
         if (!unfolded(J))
             return false;
-        const plr_real by_det = 1 / PLR_FMA(J[0], J[3], -(J[1] * J[2]));
-        const plr_real e0 = d[0] - found[0], e1 = d[1] - found[1];
-        const plr_real s0 = PLR_FMA(J[3], e0, -(J[1] * e1)) * by_det;
-        const plr_real s1 = PLR_FMA(J[0], e1, -(J[2] * e0)) * by_det;
-        x[0] += s0, x[1] += s1;
-        if (plr_abs(s0) + plr_abs(s1) < SMALL_STEP * (1 + plr_abs(x[0]) + plr_abs(x[1])))
+        const plr_real off[2] = {d[0] - found[0], d[1] - found[1]};
+        plr_solve2(by, J, off);
+        x[0] += by[0], x[1] += by[1];
+        if (plr_abs(by[0]) + plr_abs(by[1]) < SMALL_STEP * (1 + plr_abs(x[0]) + plr_abs(x[1])))
             return true;
     }
     return false;

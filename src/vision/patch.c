@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "vision/patch.h"
 
-#include <string.h>
-
 #include "math/small.h"
+#include "math/two.h"
+#include "vision/kernels.h"
 
-enum {
-    HALF = PLR_PATCH_SIDE / 2,
-    KEPT_HALF = PLR_PATCH_KEPT / 2,
-    FRACTION = 16,
-    WEIGHT = 6,
-    FINE = 6
-};
+enum { HALF = PLR_PATCH_SIDE / 2, KEPT_HALF = PLR_PATCH_KEPT / 2, FINE = 6 };
 
 #define UNIT     PLR_R(65536)
 #define STEP_MAX PLR_R(2)    /* px */
@@ -28,15 +22,6 @@ enum {
 
 /* --- cutting --- */
 
-/* The sample at a place in 1/65536 px: grey levels times 16. */
-static inline int32_t sample(const plr_image *image, int32_t x, int32_t y) {
-    const uint8_t *p = image->pixels + (uint32_t)(y >> FRACTION) * image->stride + (x >> FRACTION);
-    const uint8_t *q = p + image->stride;
-    const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63, wy = (y >> (FRACTION - WEIGHT)) & 63;
-    const int32_t top = 64 * p[0] + wx * (p[1] - p[0]), low = 64 * q[0] + wx * (q[1] - q[0]);
-    return (64 * top + wy * (low - top) + 128) >> 8;
-}
-
 /* Places of a window of so many px each way that stay inside, with the neighbour that is interpolated. */
 static bool inside(const plr_image *image, const plr_real at[2], plr_real across, plr_real down) {
     const plr_real right = (plr_real)image->width - PLR_R(1.01);
@@ -46,19 +31,14 @@ static bool inside(const plr_image *image, const plr_real at[2], plr_real across
 
 /* Rounded to the weights' resolution. */
 static int32_t fixed(plr_real x) {
-    return (int32_t)(x * UNIT) + (1 << (FRACTION - WEIGHT - 1));
+    return (int32_t)(x * UNIT) + (1 << (PLR_FRACTION - PLR_WEIGHT - 1));
 }
 
 bool plr_patch_cut(const plr_image *image, const plr_real at[2], uint8_t patch[PLR_PATCH_BYTES]) {
     if (!inside(image, at, KEPT_HALF, KEPT_HALF))
         return false;
-    const int32_t x = fixed(at[0]), y = fixed(at[1]);
-    for (int j = 0; j < PLR_PATCH_KEPT; j++)
-        for (int i = 0; i < PLR_PATCH_KEPT; i++) {
-            const int32_t s = sample(image, x + (i - KEPT_HALF) * (1 << FRACTION),
-                                     y + (j - KEPT_HALF) * (1 << FRACTION));
-            patch[PLR_PATCH_KEPT * j + i] = (uint8_t)((s + PLR_GREY / 2) / PLR_GREY);
-        }
+    plr_patch_sample(image, fixed(at[0]) - KEPT_HALF * (1 << PLR_FRACTION),
+                     fixed(at[1]) - KEPT_HALF * (1 << PLR_FRACTION), patch);
     return true;
 }
 
@@ -68,20 +48,13 @@ static plr_real central(int64_t sum_ab, int32_t sum_a, int32_t sum_b) {
 }
 
 bool plr_template_make(plr_template *t, const uint8_t patch[PLR_PATCH_BYTES]) {
-    int32_t T = 0, Jx = 0, Jy = 0, TT = 0, xT = 0, yT = 0, xx = 0, xy = 0, yy = 0;
-    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++)
-        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++) {
-            const uint8_t *p = patch + PLR_PATCH_KEPT * (j + 1) + i + 1;
-            const int32_t s = PLR_GREY * p[0], x = PLR_GREY / 2 * (p[1] - p[-1]);
-            const int32_t y = PLR_GREY / 2 * (p[PLR_PATCH_KEPT] - p[-PLR_PATCH_KEPT]);
-            t->T[k] = (int16_t)s, t->Jx[k] = (int16_t)x, t->Jy[k] = (int16_t)y;
-            T += s, Jx += x, Jy += y;
-            TT += s * s, xT += x * s, yT += y * s;
-            xx += x * x, xy += x * y, yy += y * y;
-        }
-    t->sum_T = T, t->sum_Jx = Jx, t->sum_Jy = Jy;
-    t->TT = central(TT, T, T), t->JxT = central(xT, Jx, T), t->JyT = central(yT, Jy, T);
-    t->H[0] = central(xx, Jx, Jx), t->H[1] = central(xy, Jx, Jy), t->H[2] = central(yy, Jy, Jy);
+    plr_template_sums s;
+    plr_template_fill(t, patch, &s);
+    t->sum_T = s.T, t->sum_Jx = s.Jx, t->sum_Jy = s.Jy;
+    t->TT = central(s.TT, s.T, s.T);
+    t->JxT = central(s.xT, s.Jx, s.T), t->JyT = central(s.yT, s.Jy, s.T);
+    t->H[0] = central(s.xx, s.Jx, s.Jx), t->H[1] = central(s.xy, s.Jx, s.Jy);
+    t->H[2] = central(s.yy, s.Jy, s.Jy);
     const plr_real det = PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
     /* the smaller eigenvalue is at least det / trace */
     return t->TT > 0 && det > WEAKEST * (t->H[0] + t->H[2]);
@@ -95,11 +68,9 @@ void plr_template_centre(const plr_template *t, plr_real centre[2]) {
             const int32_t s = (t->Jx[k] * (i - HALF) + t->Jy[k] * (j - HALF)) / (PLR_GREY / 2);
             S += s, xS += t->Jx[k] * s, yS += t->Jy[k] * s;
         }
-    const plr_real x = PLR_GREY / 2 * central(xS, S, t->sum_Jx);
-    const plr_real y = PLR_GREY / 2 * central(yS, S, t->sum_Jy);
-    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
-    centre[0] = PLR_FMA(t->H[2], x, -(t->H[1] * y)) * by_det;
-    centre[1] = PLR_FMA(t->H[0], y, -(t->H[1] * x)) * by_det;
+    const plr_real b[2] = {PLR_GREY / 2 * central(xS, S, t->sum_Jx),
+                           PLR_GREY / 2 * central(yS, S, t->sum_Jy)};
+    plr_solve2_symmetric(centre, t->H, b);
 }
 
 /* --- sums --- */
@@ -115,30 +86,6 @@ bool plr_grid_place(plr_grid *g, const plr_image *image, const plr_real at[2],
     for (int i = 0; i < 4; i++)
         g->A[i] = (int32_t)(A[i] * UNIT);
     return true;
-}
-
-/* Sums in 32 bits: 81 times the largest product, 4080^2, is 1.35e9. */
-void plr_patch_sum(plr_patch_sums *s, const plr_image *image, const plr_grid *g,
-                   const plr_template *t) {
-    const uint8_t *pixels = image->pixels;
-    const uint32_t stride = image->stride;
-    int32_t I = 0, II = 0, IT = 0, IJx = 0, IJy = 0;
-    int32_t x0 = g->x - HALF * (g->A[0] + g->A[1]), y0 = g->y - HALF * (g->A[2] + g->A[3]);
-    for (int j = 0, k = 0; j < PLR_PATCH_SIDE; j++, x0 += g->A[1], y0 += g->A[3]) {
-        int32_t x = x0, y = y0;
-        for (int i = 0; i < PLR_PATCH_SIDE; i++, k++, x += g->A[0], y += g->A[2]) {
-            const uint8_t *p = pixels + (uint32_t)(y >> FRACTION) * stride + (x >> FRACTION);
-            const uint8_t *q = p + stride;
-            const int32_t wx = (x >> (FRACTION - WEIGHT)) & 63;
-            const int32_t wy = (y >> (FRACTION - WEIGHT)) & 63;
-            const int32_t top = 64 * p[0] + wx * (p[1] - p[0]);
-            const int32_t low = 64 * q[0] + wx * (q[1] - q[0]);
-            const int32_t v = (64 * top + wy * (low - top) + 128) >> 8;
-            I += v, II += v * v;
-            IT += v * t->T[k], IJx += v * t->Jx[k], IJy += v * t->Jy[k];
-        }
-    }
-    s->I = I, s->II = II, s->IT = IT, s->IJx = IJx, s->IJy = IJy;
 }
 
 /* --- fits --- */
@@ -178,24 +125,20 @@ static void uncertainty(plr_fit *fit, const plr_template *t, const plr_real A[4]
     const plr_real weaker = PLR_FMA(H[0], H[2], -(H[1] * H[1])) / (H[0] + H[2]);
     const plr_real noise = PLR_SAMPLES / 2 * var, most = weaker / 2;
     const plr_real less = noise < most ? noise : most;
-    const plr_real a = H[0] - less, c = H[2] - less, b = H[1];
-    const plr_real by_det = 1 / PLR_FMA(a, c, -(b * b));
-    const plr_real S[3] = {c * by_det, -(b * by_det), a * by_det};
-    const plr_real p = PLR_FMA(S[0], H[0], S[1] * H[1]), q = PLR_FMA(S[0], H[1], S[1] * H[2]);
-    const plr_real r = PLR_FMA(S[1], H[0], S[2] * H[1]), s = PLR_FMA(S[1], H[1], S[2] * H[2]);
-    const plr_real xx = PLR_FMA(2 * var, PLR_FMA(p, S[0], q * S[1]), FLOOR_VAR);
-    const plr_real xy = 2 * var * PLR_FMA(p, S[1], q * S[2]);
-    const plr_real yy = PLR_FMA(2 * var, PLR_FMA(r, S[1], s * S[2]), FLOOR_VAR);
-    const plr_real e = PLR_FMA(A[0], xx, A[1] * xy), f = PLR_FMA(A[0], xy, A[1] * yy);
-    fit->cov[0] = PLR_FMA(e, A[0], f * A[1]);
-    fit->cov[1] = PLR_FMA(e, A[2], f * A[3]);
-    fit->cov[2] = PLR_FMA(PLR_FMA(A[2], xx, A[3] * xy), A[2], PLR_FMA(A[2], xy, A[3] * yy) * A[3]);
+    const plr_real S[3] = {H[0] - less, H[1], H[2] - less};
+    plr_real AS[2][2];
+    for (int i = 0; i < 2; i++)
+        plr_solve2_symmetric(AS[i], S, A + 2 * i);
+    for (int k = 0; k < 3; k++) {
+        const int i = k / 2, j = (k + 1) / 2;
+        const plr_real AA = PLR_FMA(A[2 * i], A[2 * j], A[2 * i + 1] * A[2 * j + 1]);
+        fit->cov[k] = PLR_FMA(2 * var, plr_product2(AS[i], H, AS[j]), FLOOR_VAR * AA);
+    }
 }
 
 /* One step's d from the place of the grid; false where the picture has no contrast there. */
 static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const plr_template *t,
                  plr_real d[2], plr_real *squares) {
-    const plr_real by_det = 1 / PLR_FMA(t->H[0], t->H[2], -(t->H[1] * t->H[1]));
     plr_patch_sums s;
     plr_patch_sum(&s, image, g, t);
     const plr_centred c = centred(&s, t);
@@ -204,11 +147,10 @@ static bool step(plr_fit *fit, const plr_image *image, const plr_grid *g, const 
     if (!(c.II > 0))
         return false;
     const plr_real gain = PLR_SQRT(t->TT / c.II);
-    const plr_real bx = PLR_FMA(gain, c.IJx, -t->JxT), by = PLR_FMA(gain, c.IJy, -t->JyT);
-    d[0] = PLR_FMA(t->H[2], bx, -(t->H[1] * by)) * by_det;
-    d[1] = PLR_FMA(t->H[0], by, -(t->H[1] * bx)) * by_det;
+    const plr_real b[2] = {PLR_FMA(gain, c.IJx, -t->JxT), PLR_FMA(gain, c.IJy, -t->JyT)};
+    plr_solve2_symmetric(d, t->H, b);
     /* |g I~ - T~|^2, less what the step takes off */
-    *squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(d[0], bx, d[1] * by);
+    *squares = 2 * (t->TT - gain * c.IT) - PLR_FMA(d[0], b[0], d[1] * b[1]);
     return true;
 }
 
@@ -245,39 +187,42 @@ void plr_patch_fit(plr_fit *fit, const plr_image *image, const plr_template *t, 
 
 /* --- slopes --- */
 
-/* x <- H^-1 b, b - B^T x for the rest: what a move of the place explains is not the slope's. */
-static void solve2(const plr_real H[3], const plr_real b[2], plr_real x[2]) {
-    const plr_real by_det = 1 / PLR_FMA(H[0], H[2], -(H[1] * H[1]));
-    x[0] = PLR_FMA(H[2], b[0], -(H[1] * b[1])) * by_det;
-    x[1] = PLR_FMA(H[0], b[1], -(H[1] * b[0])) * by_det;
-}
+/* Columns of a sample: Jx, Jy, K = (J c) o and the residual r. */
+enum { OF_J = 0, OF_K = 2, OF_R = 4, OF_ALL = 5 };
 
-/* Sums over the samples of residuals r and of K = (J c) o, beside those of J. */
-typedef struct slope_sums {
-    int64_t rr, rJ[2], rK[2], KK[3], KJ[2][2];
-    int32_t r, K[2];
-} slope_sums;
-
-static void sum_slopes(slope_sums *s, const plr_image *image, const plr_grid *g,
+/* The upper triangle of M <- the sums of the columns' products, without their means. */
+static void sum_slopes(plr_real M[OF_ALL][OF_ALL], const plr_image *image, const plr_grid *g,
                        const plr_template *t, int32_t gain, const int32_t c[2]) {
-    memset(s, 0, sizeof *s);
+    int64_t products[OF_ALL][OF_ALL] = {{0}};
+    int32_t sum[OF_ALL] = {0};
     for (int j = -HALF, k = 0; j <= HALF; j++)
         for (int i = -HALF; i <= HALF; i++, k++) {
-            const int32_t I =
-                sample(image, g->x + i * g->A[0] + j * g->A[1], g->y + i * g->A[2] + j * g->A[3]);
-            const int32_t r = gain * I / (1 << FINE) - t->T[k];
+            const int32_t I = plr_sample(image, g->x + i * g->A[0] + j * g->A[1],
+                                         g->y + i * g->A[2] + j * g->A[3]);
             const int32_t along = (t->Jx[k] * c[0] + t->Jy[k] * c[1]) / (1 << FINE);
-            const int32_t K[2] = {along * i, along * j}, J[2] = {t->Jx[k], t->Jy[k]};
-            s->r += r, s->rr += (int64_t)r * r;
-            for (int a = 0; a < 2; a++) {
-                s->K[a] += K[a];
-                s->rJ[a] += (int64_t)r * J[a], s->rK[a] += (int64_t)r * K[a];
-                for (int b = 0; b < 2; b++)
-                    s->KJ[a][b] += (int64_t)K[a] * J[b];
+            const int32_t column[OF_ALL] = {t->Jx[k], t->Jy[k], along * i, along * j,
+                                            gain * I / (1 << FINE) - t->T[k]};
+            for (int a = 0; a < OF_ALL; a++) {
+                sum[a] += column[a];
+                for (int b = 0; b <= a; b++)
+                    products[a][b] += (int64_t)column[a] * column[b];
             }
-            s->KK[0] += (int64_t)K[0] * K[0], s->KK[1] += (int64_t)K[0] * K[1];
-            s->KK[2] += (int64_t)K[1] * K[1];
         }
+    for (int a = 0; a < OF_ALL; a++)
+        for (int b = 0; b <= a; b++)
+            M[b][a] = central(products[a][b], sum[a], sum[b]);
+}
+
+/* What a column explains of those behind it is taken off. False where it explains nothing. */
+static bool eliminate(plr_real M[OF_ALL][OF_ALL], int p) {
+    if (!(M[p][p] > 0))
+        return false;
+    for (int a = p + 1; a < OF_ALL; a++) {
+        const plr_real share = M[p][a] / M[p][p];
+        for (int b = a; b < OF_ALL; b++)
+            M[a][b] = PLR_FMA(-share, M[p][b], M[a][b]);
+    }
+    return true;
 }
 
 bool plr_patch_slope(const plr_image *image, const plr_template *t, const plr_real at[2],
@@ -285,7 +230,7 @@ bool plr_patch_slope(const plr_image *image, const plr_template *t, const plr_re
                      plr_real info[3]) {
     plr_grid g;
     plr_patch_sums p;
-    slope_sums s;
+    plr_real M[OF_ALL][OF_ALL];
     if (!plr_grid_place(&g, image, at, A) || !(plr_abs(c[0]) < 4 && plr_abs(c[1]) < 4))
         return false;
     plr_patch_sum(&p, image, &g, t);
@@ -294,27 +239,17 @@ bool plr_patch_slope(const plr_image *image, const plr_template *t, const plr_re
     if (!(gain > PLR_R(0.1) && gain < 10))
         return false;
     const int32_t fine[2] = {(int32_t)(c[0] * (1 << FINE)), (int32_t)(c[1] * (1 << FINE))};
-    sum_slopes(&s, image, &g, t, (int32_t)(gain * (1 << FINE)), fine);
-    const int32_t J[2] = {t->sum_Jx, t->sum_Jy};
-    const plr_real rJ[2] = {central(s.rJ[0], s.r, J[0]), central(s.rJ[1], s.r, J[1])};
-    plr_real b[2], move[2], B[2][2], X[2][2];
-    solve2(t->H, rJ, move);
-    for (int a = 0; a < 2; a++) {
-        B[a][0] = central(s.KJ[a][0], s.K[a], J[0]), B[a][1] = central(s.KJ[a][1], s.K[a], J[1]);
-        solve2(t->H, B[a], X[a]);
-        b[a] = central(s.rK[a], s.r, s.K[a]) - PLR_FMA(B[a][0], move[0], B[a][1] * move[1]);
-    }
-    info[0] = central(s.KK[0], s.K[0], s.K[0]) - PLR_FMA(B[0][0], X[0][0], B[0][1] * X[0][1]);
-    info[1] = central(s.KK[1], s.K[0], s.K[1]) - PLR_FMA(B[0][0], X[1][0], B[0][1] * X[1][1]);
-    info[2] = central(s.KK[2], s.K[1], s.K[1]) - PLR_FMA(B[1][0], X[1][0], B[1][1] * X[1][1]);
-    if (!(PLR_FMA(info[0], info[2], -(info[1] * info[1])) > 0 && info[0] > 0))
+    sum_slopes(M, image, &g, t, (int32_t)(gain * (1 << FINE)), fine);
+    if (!eliminate(M, OF_J) || !eliminate(M, OF_J + 1)) /* a move of the place is no slope */
         return false;
-    solve2(info, b, change);
-    const plr_real rest = central(s.rr, s.r, s.r) - PLR_FMA(rJ[0], move[0], rJ[1] * move[1]) -
-                          PLR_FMA(b[0], change[0], b[1] * change[1]);
-    const plr_real by = 1 / (2 * ((rest > 0 ? rest : 0) / (PLR_SAMPLES - 6) + GREY_VAR));
-    change[0] = -change[0], change[1] = -change[1];
+    const plr_real b[2] = {-M[OF_K][OF_R], -M[OF_K + 1][OF_R]};
     for (int i = 0; i < 3; i++)
-        info[i] *= by;
+        info[i] = M[OF_K + i / 2][OF_K + (i + 1) / 2];
+    if (!eliminate(M, OF_K) || !eliminate(M, OF_K + 1))
+        return false;
+    plr_solve2_symmetric(change, info, b);
+    const plr_real rest = M[OF_R][OF_R] > 0 ? M[OF_R][OF_R] : 0;
+    for (int i = 0; i < 3; i++)
+        info[i] /= 2 * (rest / (PLR_SAMPLES - 6) + GREY_VAR);
     return true;
 }

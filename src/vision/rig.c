@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "math/small.h"
+#include "math/two.h"
 #include "vision/lens.h"
 
 /* A patch's deformation is measured over its half side, px. */
@@ -222,11 +223,10 @@ static bool carry_patch(const plr_vision *v, const plr_expected_motion *m, int s
     }
     if (!A)
         return true;
-    const plr_real det = PLR_FMA(A[0], A[3], -(A[1] * A[2]));
-    if (!(plr_abs(det) > PLR_R(0.01)))
+    const plr_real transposed[4] = {A[0], A[2], A[1], A[3]};
+    if (!(plr_abs(plr_det2(A)) > PLR_R(0.01)))
         return false;
-    s->slope[0] = PLR_FMA(A[3], slope[0], -(A[2] * slope[1])) / det;
-    s->slope[1] = PLR_FMA(A[0], slope[1], -(A[1] * slope[0])) / det;
+    plr_solve2(s->slope, transposed, slope);
     return true;
 }
 

@@ -5,6 +5,7 @@
 
 #include "math/leaky.h"
 #include "math/small.h"
+#include "math/two.h"
 #include "vision/patch.h"
 
 enum { STEPS_COARSE = 5, STEPS_FINEST = 10, CENTRE_MOVES = 4, HALF = PLR_PATCH_SIDE / 2 };
@@ -27,30 +28,17 @@ enum { STEPS_COARSE = 5, STEPS_FINEST = 10, CENTRE_MOVES = 4, HALF = PLR_PATCH_S
 #define SLOPE_MOST  PLR_R(1)
 enum { SLOPE_FITS = 3 }; /* of a birth */
 
-/* Coarse levels may lead astray: at <- the place from which it began, where that is likelier. */
-static void choose(plr_real at[2], const plr_real begun[2], const plr_image *image, unsigned level,
-                   const plr_template *t, const plr_real A[4]) {
-    if (at[0] == begun[0] && at[1] == begun[1])
-        return;
-    const plr_real led[2] = {plr_pyramid_down(at[0], level), plr_pyramid_down(at[1], level)};
-    const plr_real own[2] = {plr_pyramid_down(begun[0], level), plr_pyramid_down(begun[1], level)};
-    if (plr_patch_likeness(image, t, own, A) > plr_patch_likeness(image, t, led, A))
-        at[0] = begun[0], at[1] = begun[1];
-}
-
 /* Finds `patch` of so many levels near `at` (px of level 0, in and out), from the level `from` on. `t` becomes
  * the finest one's. */
 static bool find(plr_vision *v, const plr_levels *in, const uint8_t (*patch)[PLR_PATCH_BYTES],
                  unsigned from, const plr_real A[4], plr_real at[2], plr_template *t,
                  plr_fit *fit) {
-    const plr_real begun[2] = {at[0], at[1]};
     plr_real start[2] = {at[0], at[1]};
     memset(fit, 0, sizeof *fit);
     for (unsigned level = from + 1; level-- > 0;) {
         fit->likeness = 0;
         if (!plr_template_make(t, patch[level]))
             continue;
-        choose(at, begun, &in->level[level], level, t, A);
         start[0] = at[0], start[1] = at[1];
         fit->at[0] = plr_pyramid_down(at[0], level), fit->at[1] = plr_pyramid_down(at[1], level);
         plr_patch_fit(fit, &in->level[level], t, A, level > 0 ? STEPS_COARSE : STEPS_FINEST);
@@ -79,10 +67,6 @@ static unsigned cut(const plr_levels *from, const plr_real at[2], unsigned most,
 
 /* --- from picture to picture --- */
 
-static plr_real det(const plr_real A[4]) {
-    return PLR_FMA(A[0], A[3], -(A[1] * A[2]));
-}
-
 static bool end(plr_track *t, plr_track_end why) {
     t->why = (uint8_t)why;
     return false;
@@ -105,7 +89,7 @@ bool plr_track_expect(const plr_vision *v, const plr_expected_motion *m, plr_tra
         t->drift[0] = t->drift[1] = 0;
     for (int i = 0; i < 2; i++)
         t->at[i] = to[i] + t->drift[i];
-    const plr_real d = det(t->A);
+    const plr_real d = plr_det2(t->A);
     if (!is_inside(v, t->at) || !(d > PLR_R(0.05) && d < PLR_R(20)))
         return end(t, PLR_TRACK_LEFT_VIEW);
     return true;
@@ -150,7 +134,7 @@ bool plr_track_follow(plr_vision *v, const plr_scene *s, plr_track *t) {
     for (int i = 0; i < 2; i++)
         t->drift[i] += t->at[i] - expected[i];
     t->likeness = fit.likeness;
-    const plr_real d = det(t->A);
+    const plr_real d = plr_det2(t->A);
     if (d < SMALLEST || d > LARGEST)
         cut_anew(v, s, t);
     return true;
@@ -208,7 +192,8 @@ static bool fit_right(plr_vision *v, const plr_scene *s, const uint8_t (*patch)[
     if (!plr_rig_point(v, &s->motion, PLR_RIGHT, at, plr_rig_depth(v, t->surface.disparity), X))
         return false;
     plr_rig_virtual(v, PLR_RIGHT, X, right);
-    if (plr_abs(left[1] - right[1]) > ROW_GAP)
+    t->row_gap = right[1] - left[1];
+    if (plr_abs(t->row_gap) > ROW_GAP)
         return false;
     t->surface.disparity = left[0] - right[0];
     t->right[0] = at[0], t->right[1] = at[1];
@@ -226,20 +211,17 @@ static plr_real slope_prior(const plr_vision *v, const plr_track *t) {
 
 void plr_track_weigh_slope(plr_real slope[2], plr_real info[3], plr_real prior,
                            const plr_real measured[2], const plr_real fit[3]) {
-    const plr_real was[2] = {PLR_FMA(prior + info[0], slope[0], info[1] * slope[1]),
-                             PLR_FMA(prior + info[2], slope[1], info[1] * slope[0])};
-    const plr_real is[2] = {PLR_FMA(fit[0], measured[0], fit[1] * measured[1]),
-                            PLR_FMA(fit[1], measured[0], fit[2] * measured[1])};
-    for (int i = 0; i < 3; i++)
+    plr_real all[3] = {prior + info[0], info[1], prior + info[2]}, sum[2], mean[2];
+    for (int i = 0; i < 2; i++)
+        sum[i] = plr_leaky_sum(PLR_FMA(all[i], slope[0], all[i + 1] * slope[1]), SLOPE_KEEP,
+                               PLR_FMA(fit[i], measured[0], fit[i + 1] * measured[1]));
+    for (int i = 0; i < 3; i++) {
         info[i] = plr_leaky_sum(info[i], SLOPE_KEEP, fit[i]);
-    const plr_real a = prior + info[0], b = info[1], c = prior + info[2];
-    const plr_real x = plr_leaky_sum(was[0], SLOPE_KEEP, is[0]);
-    const plr_real y = plr_leaky_sum(was[1], SLOPE_KEEP, is[1]);
-    const plr_real of_all = PLR_FMA(a, c, -(b * b));
-    if (!(of_all > PLR_R(1e-4) * a * c))
+        all[i] = info[i] + (i == 1 ? 0 : prior);
+    }
+    if (!(PLR_FMA(all[0], all[2], -(all[1] * all[1])) > PLR_R(1e-4) * all[0] * all[2]))
         return;
-    const plr_real by_det = 1 / of_all;
-    const plr_real mean[2] = {PLR_FMA(c, x, -(b * y)) * by_det, PLR_FMA(a, y, -(b * x)) * by_det};
+    plr_solve2_symmetric(mean, all, sum);
     for (int i = 0; i < 2; i++)
         slope[i] = mean[i] > SLOPE_MOST    ? SLOPE_MOST
                    : mean[i] < -SLOPE_MOST ? -SLOPE_MOST
@@ -252,31 +234,18 @@ static void learn_slope(const plr_vision *v, const plr_scene *s, const plr_templ
     plr_real beside[2], c[2], change[2], info[3];
     plr_surface nearer = t->surface;
     nearer.disparity += 1;
-    const plr_real d = det(A);
     if (!plr_rig_across(v, &s->motion, t->at, &t->surface, c, NULL) ||
-        !plr_rig_across(v, &s->motion, t->at, &nearer, beside, NULL) || !(plr_abs(d) > PLR_R(0.01)))
+        !plr_rig_across(v, &s->motion, t->at, &nearer, beside, NULL) ||
+        !(plr_abs(plr_det2(A)) > PLR_R(0.01)))
         return;
     const plr_real e[2] = {beside[0] - c[0], beside[1] - c[1]};
-    c[0] = PLR_FMA(A[3], e[0], -(A[1] * e[1])) / d, c[1] = PLR_FMA(A[0], e[1], -(A[2] * e[0])) / d;
+    plr_solve2(c, A, e);
     if (!plr_patch_slope(&s->side[PLR_RIGHT].level[0], template, at, A, c, change, info))
         return;
     for (int i = 0; i < 3; i++)
         info[i] *= SLOPE_SHARE;
     const plr_real measured[2] = {t->surface.slope[0] + change[0], t->surface.slope[1] + change[1]};
     plr_track_weigh_slope(t->surface.slope, t->slope_info, slope_prior(v, t), measured, info);
-}
-
-/* Fits the right picture with the patch deformed as the surface lies, and learns how it does. */
-static bool match_by_slope(plr_vision *v, const plr_scene *s,
-                           const uint8_t (*patch)[PLR_PATCH_BYTES], unsigned from, plr_track *t,
-                           plr_real at[2]) {
-    plr_template template;
-    plr_real A[4];
-    if (!plr_rig_across(v, &s->motion, t->at, &t->surface, at, A) ||
-        !fit_right(v, s, patch, from, A, t, at, &template))
-        return false;
-    learn_slope(v, s, &template, A, t, at);
-    return true;
 }
 
 /* The two likeliest places along the line. */
@@ -330,21 +299,21 @@ static bool search_line(plr_vision *v, const plr_scene *s, const plr_track *t, c
 
 bool plr_track_match(plr_vision *v, const plr_scene *s, plr_track *t, bool birth) {
     uint8_t patch[2][PLR_PATCH_BYTES];
-    plr_real at[2];
-    if (!birth) {
-        const unsigned wanted = search_level(v, v->levels) > 0 ? 2 : 1;
-        const unsigned levels = cut(&s->side[PLR_LEFT], t->at, wanted, patch);
-        return levels > 0 &&
-               match_by_slope(v, s, (const uint8_t(*)[PLR_PATCH_BYTES])patch, levels - 1, t, at);
-    }
-    const uint8_t(*const born)[PLR_PATCH_BYTES] = (const uint8_t(*)[PLR_PATCH_BYTES])t->patch;
+    plr_template template;
+    plr_real at[2], A[4];
     const unsigned level = search_level(v, t->levels);
-    if (!search_line(v, s, t, born[level], level, false, &t->surface.disparity))
+    if (birth && !search_line(v, s, t, t->patch[level], level, false, &t->surface.disparity))
         return false;
-    for (int again = 0; again < SLOPE_FITS; again++)
-        if (!match_by_slope(v, s, born, again == 0 ? level : 0, t, at))
+    const unsigned wanted = search_level(v, v->levels) > 0 ? 2 : 1;
+    unsigned levels = cut(&s->side[PLR_LEFT], t->at, wanted, patch);
+    for (int fits = birth ? SLOPE_FITS : 1; fits > 0 && levels > 0; fits--, levels = 1) {
+        if (!plr_rig_across(v, &s->motion, t->at, &t->surface, at, A) ||
+            !fit_right(v, s, (const uint8_t(*)[PLR_PATCH_BYTES])patch, levels - 1, A, t, at,
+                       &template))
             return false;
-    return true;
+        learn_slope(v, s, &template, A, t, at);
+    }
+    return levels > 0;
 }
 
 bool plr_track_mirrored(plr_vision *v, const plr_scene *s, const plr_track *t) {

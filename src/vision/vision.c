@@ -19,7 +19,7 @@ enum {
 
 #define CROWDED_PX PLR_R(3)
 /* Of a row gap beside the pair's median: twice what real pictures show, 0.2 to 0.3 px. */
-#define STRAY_PX 0.5F
+#define STRAY_PX PLR_R(0.5)
 
 /* --- life --- */
 
@@ -90,19 +90,17 @@ static void take_motion(const plr_vision *v, const plr_expected *e, const plr_pi
     const plr_time_ns left = pair->left.t_ns, right = pair->right.t_ns;
     m->right_late = (plr_real)((double)(int64_t)(right - left) * 1e-9);
     m->known = e && (v->has_pair || e->velocity_known);
-    for (int i = 0; m->known && v->has_pair && i < 9; i++)
-        m->R[i] = (plr_real)e->motion.R[i];
-    for (int i = 0; m->known && v->has_pair && i < 3; i++)
-        m->p[i] = (plr_real)e->motion.p[i];
+    if (!m->known)
+        return;
+    if (v->has_pair)
+        for (int i = 0; i < 9; i++)
+            m->R[i] = (plr_real)e->motion.R[i], m->p[i / 3] = (plr_real)e->motion.p[i / 3];
     m->place_known = plr_dot3(m->p, m->p) > 0;
-    if (m->known && e->velocity_known) {
-        for (int i = 0; i < 3; i++)
-            m->w[i] = -(plr_real)e->w_C_radps[i], m->u[i] = -(plr_real)e->v_C_mps[i];
-    } else if (m->known) {
-        const plr_real rate = (plr_real)(1e9 / (double)(left - v->t_ns));
-        plr_turn_of(m->w, m->R);
-        for (int i = 0; i < 3; i++)
-            m->w[i] *= rate, m->u[i] = m->p[i] * rate;
+    const plr_real rate = (plr_real)(1e9 / (double)(left - v->t_ns));
+    plr_turn_of(m->w, m->R);
+    for (int i = 0; i < 3; i++) {
+        m->w[i] = e->velocity_known ? -(plr_real)e->w_C_radps[i] : m->w[i] * rate;
+        m->u[i] = e->velocity_known ? -(plr_real)e->v_C_mps[i] : m->p[i] * rate;
     }
 }
 
@@ -120,13 +118,13 @@ static void drop_ended(plr_vision *v) {
     unsigned kept = 0;
     for (unsigned i = 0; i < v->track_count; i++) {
         const plr_track *t = &v->tracks[i];
-        if (t->why) {
-            const plr_ended_track ended = {t->id, t->age, t->why};
-            v->ended[v->report.ended++] = ended;
-        } else {
+        if (!t->why) {
             if (kept != i)
                 v->tracks[kept] = *t;
             kept++;
+        } else if (t->age > 0) {
+            const plr_ended_track ended = {t->id, t->age, t->why};
+            v->ended[v->report.ended++] = ended;
         }
     }
     v->track_count = (uint16_t)kept;
@@ -177,17 +175,8 @@ static void follow(plr_vision *v, const plr_scene *s, const plr_expected *e) {
 }
 
 static void match(plr_vision *v, const plr_scene *s) {
-    for (unsigned i = 0; i < v->track_count; i++) {
-        plr_track *t = &v->tracks[i];
-        t->seen = plr_track_match(v, s, t, false);
-        if (t->seen) {
-            t->misses = 0;
-            v->report.observed++;
-        } else {
-            miss(t, PLR_TRACK_NO_RIGHT);
-        }
-    }
-    drop_ended(v);
+    for (unsigned i = 0; i < v->track_count; i++)
+        v->tracks[i].seen = plr_track_match(v, s, &v->tracks[i], false);
 }
 
 /* Whether a track is so near that a birth would follow the same. */
@@ -227,11 +216,43 @@ static void fill(plr_vision *v, const plr_scene *s) {
         if (is_taken(v, at, apart))
             continue;
         tries--;
-        if (begin(v, s, at, apart)) {
+        if (begin(v, s, at, apart))
             v->track_count++, v->next_id++;
-            v->report.born++;
+    }
+}
+
+/* The median of the row gaps of what is seen. */
+static plr_real usual_row_gap(const plr_vision *v) {
+    plr_real sorted[PLR_VISION_TRACKS];
+    unsigned n = 0;
+    for (unsigned i = 0; i < v->track_count; i++) {
+        unsigned j = n;
+        if (!v->tracks[i].seen)
+            continue;
+        for (n++; j > 0 && sorted[j - 1] > v->tracks[i].row_gap; j--)
+            sorted[j] = sorted[j - 1];
+        sorted[j] = v->tracks[i].row_gap;
+    }
+    return n > 0 ? sorted[n / 2] : PLR_R(0);
+}
+
+/* Whose rows differ otherwise than those of the pair's others has been matched wrong, along the line as
+ * well as across it: it is not seen, and a birth is none. The others tell what calibration and timing do to
+ * all. */
+static void judge_rows(plr_vision *v) {
+    const plr_real usual = usual_row_gap(v);
+    for (unsigned i = 0; i < v->track_count; i++) {
+        plr_track *t = &v->tracks[i];
+        if (t->seen && plr_abs(t->row_gap - usual) < STRAY_PX) {
+            t->misses = 0;
+            (*(t->age > 0 ? &v->report.observed : &v->report.born))++;
+        } else if (t->age > 0) {
+            miss(t, PLR_TRACK_NO_RIGHT);
+        } else {
+            t->why = PLR_TRACK_NO_RIGHT;
         }
     }
+    drop_ended(v);
 }
 
 /* --- what is handed out --- */
@@ -241,39 +262,6 @@ static plr_real sigma_of(const plr_vision *v, const plr_track *t) {
     const plr_real scale = v->fx / v->optics[PLR_LEFT].fx;
     const plr_real var = (t->cov[0] + t->cov[2] + t->cov[0] + t->var_right) / 3 + t->var_cut;
     return scale * PLR_SQRT(var);
-}
-
-/* By how much the observation's right row is lower, px. */
-static float row_gap(const plr_observation *o) {
-    return o->vR_px - o->vL_px;
-}
-
-/* The median of the n observations' row gaps. */
-static float usual_row_gap(const plr_observation *o, unsigned n) {
-    float sorted[PLR_VISION_TRACKS];
-    for (unsigned i = 0; i < n; i++) {
-        const float gap = row_gap(&o[i]);
-        unsigned j = i;
-        for (; j > 0 && sorted[j - 1] > gap; j--)
-            sorted[j] = sorted[j - 1];
-        sorted[j] = gap;
-    }
-    return n > 0 ? sorted[n / 2] : 0.0F;
-}
-
-/* Whose rows differ otherwise than those of the pair's others has been matched wrong, along the line as
- * well as across it. The others tell what calibration and timing do to all. Returns how many stay. */
-static unsigned leave_out_strays(plr_vision *v, unsigned n) {
-    const float usual = usual_row_gap(v->observations, n);
-    unsigned kept = 0;
-    for (unsigned i = 0; i < n; i++) {
-        const float off = row_gap(&v->observations[i]) - usual;
-        if (!(off < STRAY_PX && off > -STRAY_PX))
-            continue;
-        v->observations[kept] = v->observations[i];
-        v->sights[kept++] = v->sights[i];
-    }
-    return kept;
 }
 
 static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
@@ -294,7 +282,7 @@ static void hand_out(plr_vision *v, const plr_scene *s, plr_frame *frame) {
         v->sights[n++] = sight;
     }
     plr_watch_rows(v, &s->motion, n);
-    frame->count = (uint16_t)leave_out_strays(v, n);
+    frame->count = (uint16_t)n;
 }
 
 /* The two pictures, or one of them, cannot be used: true. */
@@ -318,6 +306,7 @@ static void look(plr_vision *v, const plr_scene *s, const plr_expected *e, plr_f
     match(v, s);
     if (!(v->report.right & PLR_PICTURE_UNUSABLE))
         fill(v, s);
+    judge_rows(v);
     v->report.swapped = v->mirrored >= SWAPPED_AFTER && v->mirrored > 3 * v->proper;
     hand_out(v, s, frame);
 }

@@ -49,6 +49,19 @@ def scale_in(recording: Recording) -> list[Fault]:
     return [fault for fault in faults_in(recording) if fault.name == "scale"]
 
 
+def test_the_same_pictures_are_examined_once() -> None:
+    recording = driven()
+    tracks, camera = recording.tracks, recording.header.camera
+    found = two_views(tracks, camera, 1)
+    assert two_views(replace(tracks, pixels=tracks.pixels.copy()), camera, 1) is found
+    assert two_views(tracks, camera, 2) is not found
+    other = tracks.pixels.copy()
+    other[0] += 0.5
+    assert two_views(replace(tracks, pixels=other), camera, 1) is not found
+    with pytest.raises(ValueError, match="read-only"):
+        found.motion.p[0] = 0  # all who asked share it
+
+
 def test_ways_have_the_length_that_they_have() -> None:
     recording = driven()
     views = two_views(recording.tracks, recording.header.camera, 1)

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from pelorus.check import halves_alike
 from pelorus.check.apart import HalvesApart, Inflated, Parts, compare, halves, of_points, windows
-from pelorus.check.contents import Frames, recording_of
+from pelorus.check.contents import recording_of
 from pelorus.check.options import Settings, options_of
 from pelorus.check.outcome import NOTHING, Bench
 from pelorus.check.parameters import Tuned, larger
@@ -179,7 +179,7 @@ def test_no_noises_are_taken_that_make_the_filter_surer(
 ) -> None:
     """They hide that pictures and twists contradict each other."""
     recording = tmp_path / "drive.plr"
-    Frames([]).write(recording, drive(20))
+    framing.write_file(recording, drive(20))
     bench = Bench(built_programs().float32, recording, tmp_path)
     apart, alike = (HalvesApart({"near and far": ratio}, 4) for ratio in (9.0, 1.0))
     monkeypatch.setattr(halves_alike, "inflate", lambda *_: Inflated(3.0, apart, alike))
@@ -197,7 +197,7 @@ def test_no_noises_are_taken_that_make_the_filter_surer(
 
 def test_halves_are_not_compared_on_a_known_map(tmp_path: Path) -> None:
     recording = tmp_path / "drive.plr"
-    Frames([]).write(recording, drive(20))
+    framing.write_file(recording, drive(20))
     bench = Bench(built_programs().float32, recording, tmp_path)
     noise = TrackNoise({}, float("nan"))
     calm = Tuned({"pixel-sigma": "0.5"}, NOTHING, NOTHING, noise)

@@ -25,7 +25,7 @@ from pelorus.check import (
     verdict,
 )
 from pelorus.check.biases import common_bias
-from pelorus.check.contents import Frames, first_frames, half, recording_of, shifted
+from pelorus.check.contents import first_frames, half, recording_of, shifted
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
 from pelorus.errors import PelorusError
@@ -39,6 +39,7 @@ from pelorus.wire.frames import (
     Kind,
     Message,
     Noise,
+    Pose,
     Reading,
     Report,
     Start,
@@ -102,11 +103,10 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
 
 
 def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) -> None:
-    messages = framing.messages_of(simulated)
     late = tmp_path / "late.plr"
-    Frames([]).write(
-        late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS)
-    )
+    messages = framing.messages_of(simulated)
+    kept = [m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)]
+    framing.write_file(late, shifted(kept, 50 * MS))
     bench = Bench(built_programs().float32, late, tmp_path)
     true = {"pixel-sigma": "1.5", "velocity-sigma": "0.3", "gyro-sigma": "0.03"}
     offset = clock.of_twists(bench, true)
@@ -139,7 +139,7 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
 ) -> None:
     early = tmp_path / "early.plr"
     messages = [m for m in framing.messages_of(flown) if m.kind not in (Kind.END, Kind.TRUTH)]
-    Frames([]).write(early, shifted(messages, -20 * MS))
+    framing.write_file(early, shifted(messages, -20 * MS))
     wrong = {"pixel-sigma": "2", "gyro-noise": "0.0005", "accel-noise": "0.3"}
     sets = [word for name, value in wrong.items() for word in ("--set", f"{name}={value}")]
     conf = tmp_path / "tuned.conf"
@@ -262,17 +262,18 @@ def report(t: int, **counts: float) -> Report:
 
 
 def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
-    from pelorus.wire.frames import Pose  # noqa: PLC0415 - only here
-
     good = report(1, matched=10, used=10, innovation_rows=30, innovation_d2=30.0)
     pose = Pose(1, after_stereo=True)
-    base = outcome.outcome_of([good, pose], 40.0)
+
+    def of(*reports: Report) -> outcome.Outcome:
+        frames = [framing.encode(m, 0).rstrip(b"\0") for m in reports]
+        return outcome.outcome_of(framing.rows_of(frames, Kind.REPORT), pose, 40.0)
+
+    base = of(good)
     assert base.nis == 1.0
-    worse = outcome.outcome_of([replace(good, gated=1), pose], 40.0)
-    assert worse.cost - base.cost == pytest.approx(4.0)
-    assert outcome.outcome_of([pose], 40.0) is outcome.NOTHING
-    refused = replace(good, status=-6)
-    assert outcome.outcome_of([good, refused, pose], 40.0).matched == 10
+    assert of(replace(good, gated=1)).cost - base.cost == pytest.approx(4.0)
+    assert of() is outcome.NOTHING
+    assert of(good, replace(good, status=-6)).matched == 10
 
 
 def test_any_run_is_likelier_than_one_that_used_nothing() -> None:
@@ -465,7 +466,7 @@ def test_a_recording_with_nothing_to_check_says_what_it_lacks(
     tmp_path: Path, pelorus: Run, kind: type[Message]
 ) -> None:
     path = tmp_path / "x.plr"
-    Frames([]).write(path, [m for m in drive(5) if not isinstance(m, kind)])
+    framing.write_file(path, [m for m in drive(5) if not isinstance(m, kind)])
     said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN, status=1)
     assert ("no twists" if kind is Twist else "no stereo frames") in said.err
     assert not (tmp_path / "t.conf").exists()
@@ -478,9 +479,18 @@ def test_a_folder_is_refused_with_what_would_be_right(tmp_path: Path, pelorus: R
     assert not (tmp_path / "t.conf").exists()
 
 
+def test_an_unknown_setting_is_refused_by_the_recordings_name(tmp_path: Path, pelorus: Run) -> None:
+    path = tmp_path / "x.plr"
+    framing.write_file(path, drive(30))
+    options = ("--set", "unknown=1", "--out", tmp_path / "t.conf", "--bin", BIN)
+    said = pelorus("check", path, *options, status=1)
+    assert "--unknown: unknown option" in said.err
+    assert "".join(said.err.split()).startswith(f"error:{path}:")
+
+
 def test_a_settings_file_that_is_none_is_refused_by_line(tmp_path: Path, pelorus: Run) -> None:
     path, conf = tmp_path / "x.plr", tmp_path / "bad.conf"
-    Frames([]).write(path, drive(5))
+    framing.write_file(path, drive(5))
     conf.write_text("# mine\npixel-sigma 2\n", encoding="utf-8")
     said = pelorus(
         "check", path, "--config", conf, "--out", tmp_path / "t.conf", "--bin", BIN, status=1

@@ -14,7 +14,7 @@ from draws import draws
 from everyday import drawn
 from everyday import drive as everyday_drive
 from injected import ALIKE, OF_RECORDINGS, found_in, of_times, piece
-from pelorus.check.contents import Frames, recording_of
+from pelorus.check.contents import recording_of
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.handeye import SEEN_MOST, first_part
 from pelorus.faults.identity import Jumps
@@ -183,7 +183,7 @@ def test_check_names_the_fault_and_writes_no_settings(tmp_path: Path, pelorus: R
         replace(m, pixels=m.pixels[:, [2, 3, 0, 1]]) if isinstance(m, Stereo) else m
         for m in drive(60)
     ]
-    Frames([]).write(path, swapped)
+    framing.write_file(path, swapped)
     said = pelorus("check", path, "--out", conf, "--bin", BIN, status=1)
     assert said.out.startswith("do not trust this")
     assert "left and right are swapped" in said.out

@@ -13,7 +13,9 @@ from pelorus.wire import settings
 from pelorus.wire.frames import (
     Config,
     Kind,
+    Message,
     Noise,
+    Report,
     Start,
     Stereo,
     Truth,
@@ -123,6 +125,20 @@ def test_a_log_replays_to_the_same_bits_with_its_own_settings(
     assert result.summary["slots"] == 9
     assert bits_of(first) == bits_of(second)
     assert [m.kind for m in log_of(first)] == [m.kind for m in log_of(second)]
+
+
+def test_answers_alone_are_those_of_the_whole_log(record: Record, tmp_path: Path) -> None:
+    recording, whole, alone = record(drive(20)), tmp_path / "log.plr", tmp_path / "answers.plr"
+    run(recording, "--out", whole)
+    run(recording, "--answers", "--out", alone)
+    answers = [untimed(m) for m in log_of(alone)]
+    assert {m.kind for m in answers} == {Kind.POSE, Kind.REPORT}
+    assert answers == [untimed(m) for m in log_of(whole) if m.kind in (Kind.POSE, Kind.REPORT)]
+
+
+def untimed(message: Message) -> Message:
+    """The message without what differs from run to run."""
+    return replace(message, update_us=0) if isinstance(message, Report) else message
 
 
 def test_a_log_of_another_build_says_that_the_bits_may_differ(

@@ -44,9 +44,10 @@ from pelorus.wire.frames import (
     Twist,
 )
 from pelorus.wire.framing import KINDS, Counts, Reader, Received, VersionError, Writer
-from pelorus.wire.image import RigMessage, Side, TimedPair, bands_of, pairs_of
+from pelorus.wire.image import RigMessage, Side, TimedPair, bands_of
 from pelorus.wire.layout import MalformedPayload, row_type
 from pelorus.wire.schema import SENSORS
+from pictures_back import pairs_of
 
 CHANCE = np.random.default_rng(11)
 R = np.linalg.qr(CHANCE.normal(size=(3, 3)))[0]

@@ -31,8 +31,9 @@ from pelorus.wire.frames import (
     Stereo,
     Twist,
 )
-from pelorus.wire.image import Image, RigMessage, TimedPair, pairs_of
+from pelorus.wire.image import Image, RigMessage, TimedPair
 from pelorus.wire.settings import IDS
+from pictures_back import pairs_of
 from replay_drive import run
 
 STANDS = np.eye(3), np.zeros(3)

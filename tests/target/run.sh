@@ -23,13 +23,14 @@ OUTPUT=$LOGS/target-boards.log
 
 # What docs/SIZES.md is measured on comes out of the same build.
 build_firmware() {
-    local board targets=()
+    local board targets=(eyes-stm32h743)
     if [ "$all" -eq 0 ]; then
-        targets=(boards bringup bench eyes-stm32f405 eyes-replay-stm32f405 eyes-mps2_an500 eyes-replay-mps2_an500)
+        targets+=(boards bringup bench eyes-stm32f405 eyes-replay-stm32f405 eyes-mps2_an500 eyes-replay-mps2_an500
+            eyes-mps3_an547 eyes-replay-mps3_an547)
     else
         for board in "${BOARDS[@]}"; do
             targets+=("pelorus-$board-n32" "bringup-$board" "kernels-$board")
-            case $board in stm32f405 | mps2_an500) targets+=("eyes-$board" "eyes-replay-$board") ;; esac
+            case $board in stm32f405 | mps2_an500 | mps3_an547) targets+=("eyes-$board" "eyes-replay-$board") ;; esac
             [ "$board" != mps2_an500 ] || targets+=("pelorus-$board-n32-f64")
         done
     fi

@@ -9,7 +9,7 @@
 #include "textbook/body.h"
 #include "textbook/observe.h"
 
-enum { TRIALS = 4, FEW = 3, BIAS = 6 };
+enum { TRIALS = 4, AGAIN = 2, FEW = 3, ENOUGH = 6, BIAS = 6 };
 
 /* Below this share of a pixel's variance an observation says nothing of a range. */
 static const double least_range_share = 0.02;
@@ -153,8 +153,8 @@ static double evaluate(search *s, const double z[6], sum *point) {
         sight *at = &s->sights[i];
         look(s, at, z, back, JL);
         const double d2 = dot(at->rho, at->rho, 3);
-        at->weight =
-            at->in_front ? at->active * (sqrt(d2) <= huber_limit ? 1 : huber_limit / sqrt(d2)) : 0;
+        const double takes_part = at->in_front && !at->left_out ? at->active : 0;
+        at->weight = takes_part * (sqrt(d2) <= huber_limit ? 1 : huber_limit / sqrt(d2));
         if (!(at->weight > 0))
             continue;
         change += huber(d2_by_best_covariance(at)) - at->cost;
@@ -286,16 +286,17 @@ static bool others_know(const sight *at, const double A[36]) {
     return fmin(M[0], fmin(M[4], M[8])) >= sqrt(least_rest);
 }
 
-static double judge(const sight *at, const sum *best, bool found) {
+static double judge(const textbook *t, const sight *at, const sum *best, bool found) {
     double A[36], b[6];
+    const double gap2 = observe_row_gap2(t, at->o);
     if (!isfinite(at->prior_d2) || !at->in_front)
         return (double)INFINITY;
     if (!found || !others_know(at, best->A))
-        return at->prior_d2;
+        return at->prior_d2 + gap2;
     memcpy(A, best->A, sizeof A);
     memcpy(b, best->b, sizeof b);
     add(at, -at->weight, A, b);
-    return distance2(at, A, b, best->z);
+    return distance2(at, A, b, best->z) + gap2;
 }
 
 /* -mu^T (P J^T S^-1 r) / r^2: the change of inverse range that the observation alone makes; none where
@@ -404,6 +405,33 @@ static void hush_outliers(search *s) {
             s->sights[i].active = 0;
 }
 
+/* True if others are left out than before, and those who stay are most of all and tell a motion alone. */
+static bool leave_rejected_out(search *s, const sum *best) {
+    unsigned same = 0, part = 0, out = 0;
+    for (unsigned i = 0; i < s->count; i++) {
+        sight *at = &s->sights[i];
+        if (!(at->active > 0))
+            continue;
+        part++;
+        const bool before = at->left_out;
+        at->left_out =
+            !observe_accepts(s->t, judge(s->t, at, best, true), residual_norm2(s->t, at));
+        same += at->left_out == before;
+        out += at->left_out;
+    }
+    return same < part && 2 * out < part && part - out >= ENOUGH;
+}
+
+/* From where all have pulled, on without what the gate rejects there; and once more. */
+static void descend_without_rejected(search *s, sum *best) {
+    for (int again = 0; again < AGAIN && leave_rejected_out(s, best); again++) {
+        const sum kept = *best;
+        (void)evaluate(s, kept.z, best);
+        accept(s);
+        descend(s, best);
+    }
+}
+
 /* Those of the frame that are in the state. */
 static void gather(search *s, const plr_frame *frame) {
     for (unsigned i = 0; i < frame->count; i++) {
@@ -432,12 +460,14 @@ void search_motion(textbook *t, const plr_frame *frame, search_result *result) {
     accept(&s);
     if (active > 0)
         descend(&s, &best);
+    if (found)
+        descend_without_rejected(&s, &best);
     memcpy(result->z, best.z, sizeof result->z);
     const double usual = usual_inverse_range(t);
     for (unsigned i = 0; i < s.count; i++) {
         const sight *at = &s.sights[i];
         textbook_landmark *l = &t->landmarks[at->landmark];
-        l->d2 = judge(at, &best, found) + observe_row_gap2(t, at->o);
+        l->d2 = judge(t, at, &best, found);
         l->norm2 = residual_norm2(t, at);
         if (!isfinite(l->d2) || !observe_accepts(t, l->d2, l->norm2))
             continue;

@@ -29,6 +29,7 @@ typedef struct textbook_sighting {
     double a[18], rho[3]; /* d z / d nu and residual, whitened */
     double weight, cost, best_S[9];
     double prior_d2; /* d2 by the twists alone; infinite if there is no place to linearise */
+    bool left_out;   /* for now: the gate rejects it */
     double active;
 } textbook_sighting;
 

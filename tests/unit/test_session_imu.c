@@ -33,6 +33,45 @@ static void test_a_batch_is_its_readings_one_by_one(void) {
     }
 }
 
+static plr_status give(int n) {
+    const plr_message m = drive_imu(INERTIAL_READING_S * n, 1, INERTIAL_READING_S);
+    return plr_session_inertial(&session, m.as.imu.t_ns, &m.as.imu.readings[0]);
+}
+
+static void test_readings_of_the_programs_own_imu_are_as_those_of_messages(void) {
+    const inertial_result sent = inertial_result_of(&inertial_plain);
+    const plr_session_totals totals = session.totals;
+    desk_clear(1);
+    desk_begin();
+    TEST_ASSERT_EQUAL(PLR_E_NOT_READY, give(0));
+    desk_send(inertial_header());
+    desk_send(drive_start(0));
+    desk_run();
+    for (int k = 0; k < INERTIAL_FRAMES; k++) {
+        for (int n = k == 0 ? 0 : INERTIAL_PER_FRAME * (k - 1) + 1; n <= INERTIAL_PER_FRAME * k;
+             n++)
+            TEST_ASSERT_EQUAL(PLR_OK, give(n));
+        inertial_send_frame(&inertial_plain, k);
+        desk_run();
+    }
+    const inertial_result given = inertial_read();
+    inertial_assert_same(&sent, &given);
+    desk_assert_nothing_refused();
+    TEST_ASSERT_EQUAL_MEMORY(&totals, &session.totals, sizeof totals);
+}
+
+static void test_readings_of_the_programs_own_imu_are_refused_like_those_of_messages(void) {
+    plr_imu nothing = {{0}, {0}};
+    TEST_ASSERT_EQUAL(PLR_E_ARGUMENT, plr_session_inertial(NULL, 0, &nothing));
+    TEST_ASSERT_EQUAL(PLR_E_ARGUMENT, plr_session_inertial(&session, 0, NULL));
+    desk_begin_drive(); /* by twists */
+    desk_send_frames(0, 2);
+    desk_run();
+    TEST_ASSERT_EQUAL(PLR_OK, give(20));
+    desk_assert_refused(PLR_KIND_IMU, PLR_E_MODE);
+    desk_assert_nothing_refused();
+}
+
 static void test_an_estimate_follows_each_reading_where_it_is_asked_for(void) {
     const inertial_manner batches = {.batch = INERTIAL_PER_FRAME};
     options.output |= PLR_OUTPUT_TWIST_POSE;

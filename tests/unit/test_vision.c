@@ -288,6 +288,35 @@ static void test_a_covered_lens_gives_no_observation_and_ends_the_tracks_in_time
     TEST_ASSERT_EQUAL(0, eyes.track_count);
 }
 
+/* The right picture's last third stands a px lower, as where a match has gone wrong: half a px is allowed. */
+static void test_tracks_whose_rows_stray_end_and_births_are_none(void) {
+    static uint8_t lower[STRIDE * H];
+    show_at(0, 0);
+    unsigned astray = 0, ended = 0;
+    for (unsigned i = 0; i < eyes.track_count; i++)
+        astray += (double)eyes.tracks[i].right[0] > 2.0 * W / 3 + 6;
+    TEST_ASSERT_GREATER_OR_EQUAL(4, astray);
+    for (int k = 0; k <= PLR_VISION_MISSES; k++) {
+        const view how = view_at(0.1 * (k + 1), 0);
+        draw(&how);
+        memcpy(lower, right, sizeof lower);
+        for (unsigned v = 1; v < H; v++)
+            memcpy(right + v * STRIDE + 2 * W / 3, lower + (v - 1) * STRIDE + 2 * W / 3, W / 3);
+        TEST_ASSERT_EQUAL(PLR_OK, look(NULL));
+        TEST_ASSERT_EQUAL(frame.count, eyes.report.observed + eyes.report.born);
+        for (unsigned i = 0; i < frame.count; i++)
+            TEST_ASSERT_FLOAT_WITHIN(0.6F, frame.observations[i].vL_px,
+                                     frame.observations[i].vR_px);
+        for (unsigned i = 0; i < eyes.report.ended; i++) {
+            ended += eyes.ended[i].why == PLR_TRACK_NO_RIGHT;
+            TEST_ASSERT_EQUAL(k + 1, eyes.ended[i].age);
+        }
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL(astray, ended);
+    for (unsigned i = 0; i < eyes.track_count; i++)
+        TEST_ASSERT_TRUE((double)eyes.tracks[i].right[0] < 2.0 * W / 3 + 6);
+}
+
 static void test_a_repeated_pair_repeats_its_observations(void) {
     static plr_observation before[PLR_VISION_TRACKS];
     show_at(0, 0);

@@ -26,7 +26,11 @@ DEPTH_M, BASELINE_M, SPEED_MPS, G = 2.5, 0.1, 0.8, 9.81
 FORWARD_LEFT_UP = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])  # body to camera
 WAVES = 40
 # Width and height of pictures, tracks, landmarks.
-BOARDS = {"stm32f405": (160, 120, 32, 32), "mps2_an500": (320, 240, 50, 64)}
+BOARDS = {
+    "stm32f405": (160, 120, 32, 32),
+    "mps2_an500": (320, 240, 50, 64),
+    "mps3_an547": (320, 240, 50, 64),
+}
 
 
 def wall(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.uint8]:

@@ -6,7 +6,7 @@ evaluate recordings.
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-ARITHMETIC = 24  # PLR_ARITHMETIC of the library that these tools belong to
+ARITHMETIC = 25  # PLR_ARITHMETIC of the library that these tools belong to
 
 __all__ = [
     "NOT_SEEN_PX",

@@ -9,6 +9,9 @@ set(cpu_m7 -mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16)
 # the tiles of the kernels no longer fit into them: 8 % more instructions a frame.
 set(cpu_m55 -mcpu=cortex-m55+nomve -mthumb -mfloat-abi=hard -mfpu=auto -fno-schedule-insns)
 
+#   cpu_<name>_pixels: how src/vision/kernels.c is compiled beside that
+set(cpu_m55_pixels -mcpu=cortex-m55+nomve.fp)
+
 #   cpu_<name>_guard: how the stack's end is watched
 set(cpu_m4f_guard stack_guard_mpu.c)
 set(cpu_m7_guard stack_guard_mpu.c)
@@ -32,7 +35,16 @@ set(board_stm32f405_cpu m4f)
 set(board_stm32f405_drivers stm32_usart.c stm32_flash.c)
 set(board_stm32f405_largest 48)
 
+set(board_stm32h743_cpu m7)
+set(board_stm32h743_drivers stm32h7_usart.c stm32h7_i2c.c stm32h7_camera.c stm32h7_imu.c mt9v034.c ../capture.c)
+set(board_stm32h743_largest 32)
+
 #   board_<name>_eyes: pixels of a picture, tracks, and landmarks of its images with eyes, if there are some; they take
 #   memory_eyes.ld where the board has one
 set(board_stm32f405_eyes 19200 32 32)
 set(board_mps2_an500_eyes 76800 50 64)
+set(board_mps3_an547_eyes 76800 50 64)
+set(board_stm32h743_eyes 90240 50 64)
+
+#   board_<name>_sensors: cameras and IMU of its images with eyes, in the place of pictures that come over the link
+set(board_stm32h743_sensors sensors_stereo.c)

@@ -11,8 +11,12 @@ set(spent_in ${PELORUS_SOURCES})
 list(FILTER spent_in INCLUDE REGEX "/src/(math/(blocks3|checksum|dense|packed|se3|so3)|process/(imu[a-z_]*|twist|statistics)|sensor/stereo|\
 state/(covariance[a-z_]*|model_body|polar|rigid_fit)|\
 filter/(correction|guard|motion_first|search)|\
-vision/(corners|lens|patch|pyramid|rig|track|vision|watch))\\.c$")
+vision/(corners|kernels|lens|patch|pyramid|rig|track|vision|watch))\\.c$")
 set_source_files_properties(${spent_in} PROPERTIES COMPILE_OPTIONS -O3)
+
+# The loops over pixels may be in vectors of integers: they change no bit, which those of floats would.
+set_source_files_properties("${PELORUS_ROOT}/src/vision/kernels.c" PROPERTIES
+  COMPILE_OPTIONS "-O3;$<TARGET_PROPERTY:PIXEL_OPTIONS>")
 
 set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
 set(IMAGES "${CMAKE_CURRENT_BINARY_DIR}/images")
@@ -50,6 +54,7 @@ function(cortexm_options target cpu)
   set_target_properties(${target} PROPERTIES
     C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF EXCLUDE_FROM_ALL ON)
   target_compile_options(${target} PRIVATE ${cpu_${cpu}} -g)
+  set_target_properties(${target} PROPERTIES PIXEL_OPTIONS "${cpu_${cpu}_pixels}")
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:C>:${flags_c}>")
 endfunction()
 
@@ -157,7 +162,7 @@ function(cortexm_image name board library bits)
   target_link_libraries(${name} PRIVATE ${library})
   target_link_options(${name} PRIVATE ${cpu_${cpu}} -nostartfiles --specs=nano.specs
     "-Wl,--defsym=STACK_SIZE=${stack_bytes_${bits}}"
-    -T "${folder}/${script}" "-L${PORT}/boards" -Wl,--gc-sections -Wl,--fatal-warnings
+    -T "${folder}/${script}" "-L${PORT}/boards" "-L${folder}" -Wl,--gc-sections -Wl,--fatal-warnings
     "-Wl,-Map=${IMAGES}/${name}.map" ${FORBIDDEN})
   add_custom_command(TARGET ${name} POST_BUILD
     COMMAND "${CMAKE_OBJCOPY}" -O binary "${IMAGES}/${name}.elf" "${IMAGES}/${name}.bin"
@@ -168,8 +173,13 @@ endfunction()
 # QEMU: PELORUS_CCM_ORIGIN says where that has a second memory.
 function(cortexm_eyes board)
   cortexm_eyes_library(library ${board})
+  set(sensors eyes_static.c sensors_none.c)
+  if(DEFINED board_${board}_sensors)
+    set(sensors ${board_${board}_sensors})
+  endif()
+  list(TRANSFORM sensors PREPEND "${PORT}/")
   cortexm_image(eyes-${board} ${board} ${library} 32
-    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" "${PORT}/eyes_static.c" "${PORT}/telemetry_none.c")
+    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" ${sensors} "${PORT}/telemetry_none.c")
   add_dependencies(eyes eyes-${board})
   set(recording "${PELORUS_EYES_RECORDINGS}/${board}.plr")
   if(NOT PELORUS_EYES_RECORDINGS OR NOT EXISTS "${recording}")
@@ -211,7 +221,8 @@ function(cortexm_firmware board capacity bits)
     string(APPEND suffix -f64)
   endif()
   cortexm_image(pelorus-${suffix} ${board} ${library} ${bits}
-    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" "${PORT}/eyes_none.c" ${telemetry_sources})
+    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" "${PORT}/eyes_none.c" "${PORT}/sensors_none.c"
+    ${telemetry_sources})
   if(PELORUS_MAVLINK)
     add_dependencies(pelorus-${suffix} pelorus_mavlink_headers)
   endif()

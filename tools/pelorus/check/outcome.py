@@ -10,13 +10,13 @@ lie anywhere in the picture: otherwise the best settings would be those that rej
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.check.apart import Parts
 from pelorus.check.contents import (
@@ -30,11 +30,13 @@ from pelorus.check.contents import (
     within,
 )
 from pelorus.check.options import Settings, options_of
+from pelorus.check.slots import Slots
+from pelorus.errors import PelorusError
 from pelorus.io.trajectory import POSE_SIZE
 from pelorus.native.replay import stuffed_answers, threads
 from pelorus.program.console import progress
 from pelorus.wire import framing
-from pelorus.wire.frames import Header, Kind, Message, Pose, Process, Report, Stereo
+from pelorus.wire.frames import Header, Kind, Message, Pose, Process, Stereo
 from pelorus.wire.layout import Floats, unpack_symmetric
 from pelorus.wire.schema import number
 
@@ -46,6 +48,8 @@ BEGIN_NS = 1_000_000_000  # a recording may begin at zero; offsets must not lead
 OFFSET_MOST_S = 0.1
 OFFSET, PART, LENGTH, SCALE = "@offset", "@part", "@frames", "@scale"
 CAMERA_OFFSET = "camera-offset"
+COUNTED = ("matched", "used", "gated", "innovation_rows")
+SUMMED = (*COUNTED, "innovation_d2", "innovation_log_det")
 CONTRADICTED = number("reason", "TWIST_CONTRADICTED")
 
 
@@ -98,9 +102,10 @@ class Bench:
         part = within(first_frames(messages), round(OFFSET_MOST_S * 1e9))
         self._messages = not_before(part, BEGIN_NS)
         self._frames = Frames(self._messages)
-        self._folder = folder
+        self._source, self._folder = recording, folder
         self._program = program
         self._outlier_cost = outlier_cost(self.header, messages)
+        self._slots = Slots(self._messages)
         self._known: dict[tuple[tuple[str, str], ...], Outcome] = {}
         self._written: dict[tuple[str, ...], Path] = {}
 
@@ -148,12 +153,15 @@ class Bench:
         settings = dict(key)
         recording = self._recording(settings)
         wanted = {k: v for k, v in settings.items() if not k.startswith("@")}
-        options = options_of(wanted | {"gate-d2": GATE_D2})
-        frames = stuffed_answers(self._program, recording, options)
+        options = options_of(self._slots.sparing(wanted) | {"gate-d2": GATE_D2})
+        try:
+            frames = stuffed_answers(self._program, recording, options)
+        except PelorusError as error:
+            words = str(error).replace(str(recording), str(self._source))
+            raise PelorusError(words) from error
         poses = framing.only(reversed(frames), Kind.POSE)
-        last = (m for m in poses if isinstance(m, Pose) and m.after_stereo)
-        told = chain(framing.only(frames, Kind.REPORT), islice(last, 1))
-        return outcome_of(told, self._outlier_cost)
+        last = next((m for m in poses if isinstance(m, Pose) and m.after_stereo), None)
+        return outcome_of(framing.rows_of(frames, Kind.REPORT), last, self._outlier_cost)
 
 
 def _plain(settings: Settings) -> Settings:
@@ -170,38 +178,28 @@ def _plain(settings: Settings) -> Settings:
     return kept
 
 
-def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
-    """Returns the outcome from a filter's REPORTs and POSEs."""
-    rows, d2, matched, used, gated, contradicted = 0, 0.0, 0, 0, 0, 0
-    by_frame: list[float] = []
-    last: Pose | None = None
-    for message in answers:
-        if isinstance(message, Pose) and message.after_stereo:
-            last = message
-        if not isinstance(message, Report) or message.subject != Kind.STEREO or message.status:
-            continue
-        contradicted += bool(message.reasons & CONTRADICTED)
-        matched, used = matched + message.matched, used + message.used
-        gated += message.gated
-        d2, rows = d2 + message.innovation_d2, rows + message.innovation_rows
-        normal = message.innovation_rows * math.log(2 * math.pi) + message.innovation_log_det
-        by_frame.append(normal + message.innovation_d2 + message.gated * cost_of_outlier)
-    if not matched or not rows or last is None:
+def outcome_of(reports: NDArray[np.void], last: Pose | None, cost_of_outlier: float) -> Outcome:
+    """Returns the outcome from the rows of a filter's REPORTs and its last POSE."""
+    rows = reports[(reports["subject"] == Kind.STEREO) & (reports["status"] == 0)]
+    of_row = {name: rows[name].astype(np.float64) for name in SUMMED}
+    matched, used, gated, count = (int(of_row[name].sum()) for name in COUNTED)
+    if not matched or not count or last is None:
         return NOTHING
+    normal = of_row["innovation_rows"] * math.log(2 * math.pi) + of_row["innovation_log_det"]
+    by_frame = normal + of_row["innovation_d2"] + of_row["gated"] * cost_of_outlier
     cost = math.fsum(by_frame)
-    variance = np.asarray(last.bias_variance, np.float64)
     return Outcome(
         cost / matched if math.isfinite(cost) else math.inf,
         matched,
         used,
         gated,
         len(by_frame),
-        d2 / rows,
+        float(of_row["innovation_d2"].sum()) / count,
         np.asarray(last.bias, np.float64),
-        variance,
-        contradicted / len(by_frame),
+        np.asarray(last.bias_variance, np.float64),
+        float(np.mean(rows["reasons"] & CONTRADICTED != 0)),
         _log_det(last),
-        np.array(by_frame),
+        by_frame,
     )
 
 

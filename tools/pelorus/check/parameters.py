@@ -19,7 +19,6 @@ from pelorus.wire.schema import DEFAULTS
 AXES = "xyz"
 PAYS = 20.0  # -2 ln of the likelihood ratio that a further parameter, or another timing, must gain
 FRAMES_FEW = 100  # with fewer frames the result may be chance
-FEWER_SLOTS = 30  # landmarks in a coarse search: a third of the time
 
 
 class Parameter(NamedTuple):
@@ -185,11 +184,6 @@ def pooled(values: Mapping[str, float], name: str) -> float:
     if name in values:
         return values[name]
     return float(np.exp(np.mean([np.log(values[f"{name}-{axis}"]) for axis in AXES])))
-
-
-def fewer_slots(given: Settings) -> dict[str, str]:
-    """Returns the settings for a coarse search."""
-    return {"slots": str(min(int(float(given.get("slots", "100"))), FEWER_SLOTS))}
 
 
 def merged(settings: Settings) -> dict[str, str]:

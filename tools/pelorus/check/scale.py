@@ -29,17 +29,20 @@ STEP, STEPS = 0.01, 4
 SURE = 4.0  # sigmas from which a scale is off
 BY_BIAS = 1.5  # ratio of sigmas with and without biases, above which the biases hide the scale
 BASELINE_MOST = 0.1  # largest baseline-sigma that the setting takes
-NEAR = 2.5  # steps
+BESIDE = 2  # steps to either side of the best one, through which a parabola is laid
 
 
 def off_by(bench: Bench, settings: Settings) -> float:
     """Returns the best factor minus 1; 0 where the factor may be 1."""
-    factors = 1 + STEP * np.arange(-STEPS, STEPS + 1)
-    ran = bench.run_all([{**settings, SCALE: f"{at:.3f}"} for at in factors], "scale")
-    most = max(outcome.matched for outcome in ran)
-    costs = np.stack([clock.of_parts(outcome, most) for outcome in ran])
-    best = factors[np.argmin(costs.sum(axis=1))]
-    near = np.abs(factors - best) < NEAR * STEP
+    for reach in (BESIDE, STEPS):  # the outer steps only where the best one is not in the middle
+        factors = 1 + STEP * np.arange(-reach, reach + 1)
+        ran = bench.run_all([{**settings, SCALE: f"{at:.3f}"} for at in factors], "scale")
+        most = max(outcome.matched for outcome in ran)
+        costs = np.stack([clock.of_parts(outcome, most) for outcome in ran])
+        best = factors[np.argmin(costs.sum(axis=1))]
+        near = np.abs(factors - best) < (BESIDE + 0.5) * STEP
+        if near.all():
+            break
     foot = clock.foot(factors[near] - 1, costs[near])
     return foot.best_s if foot.gain > PAYS else 0.0
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pelorus.check import clock, scale, tuning_imu
+from pelorus.check import clock, scale, slots, tuning_imu
 from pelorus.check.biases import WIDE, biases_by_halves, gyro_bias_in_drift
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, SCALE, Bench
@@ -22,7 +22,6 @@ from pelorus.check.parameters import (
     PAYS,
     TWIST,
     Tuned,
-    fewer_slots,
     merged,
     offset_settings,
     pooled,
@@ -36,6 +35,7 @@ from pelorus.converters.twist_noise import TwistSpread, difference_of_a_reading
 SPREAD_FRAMES = 20  # enough to measure a spread to a fifth, as a start
 FINE = (1.3, 1.15)
 TWO_CLOCKS = "no timing suits velocities and rates of turn of two clocks: yours stays"
+ALIKE = "one sigma for all axes"
 OF_AXES = (2.0, 1.5)  # factors from one sigma for all axes to one for each
 
 
@@ -64,7 +64,7 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
         fixed |= noise.setting(given)
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
         return Tuned(settings, before, bench.run(settings), noise, [words])
-    rough = fixed | WIDE | fewer_slots(given)
+    rough = fixed | WIDE | slots.fewer(given)
     values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)
     offset = clock.of_twists(bench, rough | written(values, TWIST)) if one_clock else clock.UNTOLD
     if offset.gain > PAYS:  # a wrong clock is not noise, so it comes first
@@ -192,15 +192,23 @@ def _moved(
 
 
 def _axes(bench: Bench, fixed: Settings, found: BestFound) -> tuple[BestFound, str]:
-    """Returns a sigma for each axis where that pays: two parameters more for each kind."""
+    """Returns a sigma for each axis where that pays: two parameters more for each kind.
+
+    Few landmarks tell first whether the axes differ at all: from one sigma for all, sigmas of their
+    own gain at most a few where they do not, and hundreds where they do.
+    """
     split = {"pixel": found.values["pixel"]}
     for name in ("velocity", "gyro"):
         for axis in AXES:
             key = f"{name}-{axis}"
             split[key] = found.values[key] if key in found.values else found.values[name]
-    rough = search_noises(
-        bench, {**fixed, **fewer_slots(fixed)}, split, TWIST, OF_AXES, "noise by axis"
-    )
+    few = {**fixed, **slots.fewer(fixed)}
+    one_for_all = bench.run({**few, **written(split, TWIST)})
+    rough = search_noises(bench, few, split, TWIST, OF_AXES[:1], "noise by axis")
+    observations = found.outcome.matched / max(rough.outcome.matched, 1)
+    if rough.outcome.gain_over(one_for_all) * observations < PAYS:
+        return found, ALIKE
+    rough = search_noises(bench, few, rough.values, TWIST, OF_AXES[1:], "noise by axis")
     result = search_noises(bench, fixed, rough.values, TWIST, FINE[1:], "noise by axis")
     said = []
     for name in ("velocity", "gyro"):
@@ -217,4 +225,4 @@ def _axes(bench: Bench, fixed: Settings, found: BestFound) -> tuple[BestFound, s
         else:
             result = one
     better = result if result.outcome.cost < found.outcome.cost else found
-    return better, ", ".join(said) or "one sigma for all axes"
+    return better, ", ".join(said) or ALIKE

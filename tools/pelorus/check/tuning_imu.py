@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pelorus.check import clock
+from pelorus.check import clock, slots
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, Bench, Outcome
 from pelorus.check.parameters import (
@@ -24,7 +24,6 @@ from pelorus.check.parameters import (
     WALKS,
     Parameter,
     Tuned,
-    fewer_slots,
     merged,
     offset_settings,
     starting,
@@ -57,7 +56,7 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     side |= written(walks, WALKS)
     values, offset = _roughly(bench, side, values)
     side[OFFSET] = f"{offset.best_s:.6f}"
-    values = search_noises(bench, side | fewer_slots(given), values, IMU, MIDDLE).values
+    values = search_noises(bench, side | slots.fewer(given), values, IMU, MIDDLE).values
     offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s, clock.NEAR_STEPS)
     side, words = _clock(side | written(values, IMU), offset, given)
     said.append(words)
@@ -88,11 +87,11 @@ def _roughly(
     The noises use the drive's beginning. The clock is searched with larger IMU noises, which widen
     the valley of its cost.
     """
-    short = {**side, **fewer_slots(side), LENGTH: COARSE_FRAMES}
+    short = {**side, **slots.fewer(side), LENGTH: COARSE_FRAMES}
     coarse = search_noises(bench, short, values, IMU, COARSE).values
     loose = {name: LOOSE * max(coarse[name], values[name]) for name in ("gyro", "accel")}
     loose["pixel"] = coarse["pixel"]
-    rough = {**side, **fewer_slots(side), **written(loose, IMU)}
+    rough = {**side, **slots.fewer(side), **written(loose, IMU)}
     offset = clock.of_imu(bench, rough, float(side[OFFSET]))
     if offset.gain > PAYS:
         short[OFFSET] = f"{offset.best_s:.6f}"
@@ -155,7 +154,7 @@ def _timing(
 
 def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[dict[str, str], str]:
     """Returns how fast the biases wander, where the drive is long enough to show it, and words."""
-    quick = {**side, **fewer_slots(side)}
+    quick = {**side, **slots.fewer(side)}
     found = search_noises(bench, quick, given, WALKS, WALK_STEPS)
     kept = dict(given)
     for name in WALKS:
@@ -248,7 +247,7 @@ def _of_drifting_tracks(
     if differs_clearly(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     settings = {**side, **noise.setting(side), **written(values, PIXEL | IMU | WALKS)}
-    offset = clock.of_imu(bench, settings | fewer_slots(settings), float(side[OFFSET]))
+    offset = clock.of_imu(bench, settings | slots.fewer(settings), float(side[OFFSET]))
     settings, words = _clock(settings, offset, {"camera-offset": side[OFFSET]})
     outcome = bench.run(settings)
     offset_s = float(settings.pop(OFFSET))

@@ -12,6 +12,7 @@ what is measured here.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from hashlib import sha256
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ SIGMA_LEAST_PX = 0.02
 RIDGE = 1e-3  # keeps frames without observations solvable
 STEP_MAX = 1.0  # m and rad an iteration
 CHI2_3_MEDIAN = 2.366
+KEPT = 8  # results
 FAR_OFF = 50.0  # d^2 beyond which a point stays where the first view has it
 
 
@@ -55,7 +57,22 @@ class TwoViews:
 
 
 def two_views(tracks: Tracks, camera: Camera, lag: int) -> TwoViews:
-    """Estimates all motions at once, by Gauss-Newton with robust weights."""
+    """Estimates all motions at once, by Gauss-Newton with robust weights.
+
+    The results of the last pictures are kept: many faults are looked for in the same ones.
+    """
+    digest = sha256(repr((camera, lag, tracks.frame_count)).encode())
+    for column in (tracks.frame, tracks.id, tracks.pixels):
+        digest.update(np.ascontiguousarray(column).data)
+    key = digest.digest()
+    found = _known.pop(key, None)
+    _known[key] = found = _estimated(tracks, camera, lag) if found is None else found
+    while len(_known) > KEPT:
+        del _known[next(iter(_known))]
+    return found
+
+
+def _estimated(tracks: Tracks, camera: Camera, lag: int) -> TwoViews:
     pairs = tracks.pairs(lag)
     rows = np.abs(tracks.pixels[:, 1] - tracks.pixels[:, 3]) < ROW_GAP_MAX_PX
     good = rows[pairs.first] & rows[pairs.second]
@@ -64,7 +81,7 @@ def two_views(tracks: Tracks, camera: Camera, lag: int) -> TwoViews:
     solver = _Solver(camera, frame, count, tracks.pixels[first], tracks.pixels[second])
     for k in progress(range(ITERATIONS), "camera motion", ITERATIONS):
         solver.step(WIDE if k < WIDE_ITERATIONS else NARROW)
-    return TwoViews(
+    found = TwoViews(
         lag,
         Poses(se3.nearest_rotation(solver.R), solver.p),
         np.asarray(np.linalg.inv(solver.H) * solver.sigma**2, np.float64),
@@ -75,6 +92,13 @@ def two_views(tracks: Tracks, camera: Camera, lag: int) -> TwoViews:
         second,
         solver.d2 / solver.sigma**2,
     )
+    for shared in (*found.motion, *vars(found).values()):
+        if isinstance(shared, np.ndarray):
+            shared.flags.writeable = False
+    return found
+
+
+_known: dict[bytes, TwoViews] = {}  # by a digest of the pictures
 
 
 class _Solver:

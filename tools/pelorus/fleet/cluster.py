@@ -27,8 +27,12 @@ DIED = (
     "its worker died several times while judging it: for want of memory, or by a crash; the same "
     "command tries once more"
 )
-# One task a worker: none is blamed for the death of another.
-OPTIONS = {"distributed.scheduler.worker-saturation": 1.0}
+OPTIONS = {
+    # One task a worker: none is blamed for the death of another.
+    "distributed.scheduler.worker-saturation": 1.0,
+    # Dask has freed memory given back at once, so each large array of numpy's asks for it anew.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+}
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PELORUS_THREADS": "1"}
 
 

@@ -91,10 +91,11 @@ class NothingUsefulError(PelorusError):
 
 
 def stuffed_answers(program: Path, recording: Path, options: Sequence[str]) -> list[bytes]:
-    """Returns the frames of the filter's answers to a recording, not yet decoded."""
+    """Returns the frames of the filter's poses and reports on a recording, not yet decoded."""
     with tempfile.TemporaryDirectory(prefix="pelorus-", dir=recording.parent) as folder:
         answers = Path(folder) / "answers.plr"
-        run_program(program, recording, ["--quiet", *options, "--out", str(answers)])
+        wanted = ["--quiet", "--answers", "--out", str(answers)]
+        run_program(program, recording, [*options, *wanted])
         return stuffed_of(answers)
 
 

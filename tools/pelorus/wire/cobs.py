@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Consistent Overhead Byte Stuffing (Cheshire and Baker, 1999): no zero inside a frame."""
 
+from itertools import chain
+
 BLOCK_MAX = 254  # data bytes after a code byte; the code 0xFF stands for a full block
 
 
 _CODE = [bytes((length,)) for length in range(256)]
+_CODE_OF_RUN = _CODE[1:]
 
 
 def encode(body: bytes) -> bytes:
@@ -12,8 +15,12 @@ def encode(body: bytes) -> bytes:
 
     A full block at the very end gets no empty block after it; `decode` accepts both forms.
     """
-    out: list[bytes] = []
     runs = body.split(b"\0")
+    lengths = list(map(len, runs))
+    if max(lengths) < BLOCK_MAX:  # as in most frames: without a loop in Python
+        codes = map(_CODE_OF_RUN.__getitem__, lengths)
+        return b"".join(chain.from_iterable(zip(codes, runs, strict=True)))
+    out: list[bytes] = []
     last = len(runs) - 1
     for number, run in enumerate(runs):
         if len(run) < BLOCK_MAX:

@@ -187,8 +187,9 @@ def _has_real(fields: Sequence[Field]) -> bool:
 
 
 def row_type(fields: Sequence[Field]) -> np.dtype[Any]:
-    """Returns numpy's type of a row of a message."""
-    return np.dtype([(field.name, CODES[field.type]) for field in fields])
+    """Returns numpy's type of a row of a message, or of a message of single numbers."""
+    names = (f"_{k}" if field.name == "_" else field.name for k, field in enumerate(fields))
+    return np.dtype([(name, CODES[f.type]) for name, f in zip(names, fields, strict=True)])
 
 
 def _run_of(field: Field) -> tuple[str, int]:

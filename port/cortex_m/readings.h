@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+/* Readings of an IMU on their way from its interrupt, the only writer, to the loop, the only reader. */
+#ifndef PELORUS_CORTEX_M_READINGS_H
+#define PELORUS_CORTEX_M_READINGS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { READINGS = 64 }; /* a power of two; 0.3 s at 200 Hz, of which a frame takes a sixth */
+
+/* As the chip has it. */
+typedef struct reading {
+    uint64_t t_ns;
+    int16_t accel[3], gyro[3];
+} reading;
+
+typedef struct readings {
+    reading ring[READINGS];
+    volatile uint32_t put, taken, lost;
+} readings;
+
+/* Interrupt. */
+static inline void readings_put(readings *r, const reading *one) {
+    if (r->put - r->taken == READINGS) {
+        ++r->lost;
+        return;
+    }
+    r->ring[r->put % READINGS] = *one;
+    ++r->put;
+}
+
+/* Loop: the oldest reading, if it is not later than that. */
+static inline bool readings_take(readings *r, uint64_t until_ns, reading *one) {
+    if (r->put == r->taken || r->ring[r->taken % READINGS].t_ns > until_ns) {
+        return false;
+    }
+    *one = r->ring[r->taken % READINGS];
+    ++r->taken;
+    return true;
+}
+
+#endif

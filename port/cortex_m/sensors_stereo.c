@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+/*
+ * From two cameras and an IMU to the session: readings up to a pair's time, then the pair. The cameras' lenses and
+ * where they stand come over the link (HEADER, RIG); before a HEADER nothing is handed over.
+ */
+#include <string.h>
+
+#include "board.h"
+#include "camera.h"
+#include "clock.h"
+#include "exposure.h"
+#include "eyes.h"
+#include "sensors.h"
+
+/* Of each camera; a board's cmake line says PLR_VISION_PIXELS, which is no more than this. */
+enum {
+    WIDTH = 376,
+    HEIGHT = 240,
+    PIXELS = WIDTH * HEIGHT,
+    STRIP_ROWS = 8,
+    EXPOSURE_FIRST = 150, /* rows of 32 us: 4.8 ms */
+    EXPOSURE_MOST = 315,  /* 10 ms */
+    TRIES = 3,            /* at a start in step */
+    PROBE = 16,           /* of each so many rows and columns one pixel tells the exposure */
+    READINGS_AT_ONCE = READINGS
+};
+
+/* A pair is there so long after the middle of its exposure at the latest: half the longest exposure, and 20 ms to
+ * read it out. Readings wait so long, for one that was given cannot be taken back before the pair. */
+#define CAMERA_LATE_NS UINT64_C(30000000)
+/* Within which some pattern must come: a picture does every 50 ms. */
+#define PATTERN_NS UINT64_C(500000000)
+
+const uint32_t sensors_output = PLR_OUTPUT_ECHO;
+
+static plr_eyes eyes __attribute__((section(".bss.eyes")));
+static uint32_t first_pair[2][PIXELS / 4] __attribute__((section(".bss.pictures")));
+static uint32_t second_pair[2][PIXELS / 4] __attribute__((section(".pictures2")));
+static capture pairs;
+static readings queue;
+static uint16_t exposure;
+static bool started;
+
+plr_eyes *firmware_eyes(void) {
+    return plr_eyes_init(&eyes, NULL, NULL, 0) == PLR_OK ? &eyes : NULL;
+}
+
+static void clear_pairs(void) {
+    memset(&pairs, 0, sizeof pairs);
+    pairs.pairs[0].left = (uint8_t *)first_pair[0];
+    pairs.pairs[0].right = (uint8_t *)first_pair[1];
+    pairs.pairs[1].left = (uint8_t *)second_pair[0];
+    pairs.pairs[1].right = (uint8_t *)second_pair[1];
+    pairs.width = WIDTH;
+    pairs.height = HEIGHT;
+    pairs.rows = STRIP_ROWS;
+}
+
+static const capture_pair *next_pair_within(uint64_t ns) {
+    const uint64_t start_ns = clock_ns();
+    while (clock_ns() - start_ns < ns) {
+        const capture_pair *pair = capture_take(&pairs);
+        board_watchdog_feed();
+        if (pair != NULL) {
+            return pair;
+        }
+    }
+    return NULL;
+}
+
+/* Both sensors send the same pattern: read out in step they give the same pixels. One clock out of step, and each
+ * right picture would be shifted. */
+static const char *check_in_step(void) {
+    const char *trouble = NULL;
+    for (unsigned i = 0; i < TRIES; ++i) {
+        clear_pairs();
+        trouble = camera_start(&pairs, true);
+        const capture_pair *pair = trouble == NULL ? next_pair_within(PATTERN_NS) : NULL;
+        camera_stop();
+        if (pair != NULL && memcmp(pair->left, pair->right, PIXELS) == 0) {
+            return NULL;
+        }
+        if (trouble == NULL) {
+            trouble = pair == NULL
+                          ? "no picture comes: look at trigger, clock and synchronisation pins"
+                          : "the two cameras are not read out in step: their test patterns differ";
+        }
+    }
+    return trouble;
+}
+
+const char *sensors_start(void) {
+    const char *trouble = moments_start();
+    trouble = trouble != NULL ? trouble : check_in_step();
+    if (trouble == NULL) {
+        clear_pairs();
+        trouble = imu_start(&queue);
+    }
+    if (trouble == NULL) {
+        trouble = camera_start(&pairs, false);
+        exposure = EXPOSURE_FIRST;
+        camera_expose(exposure);
+    }
+    started = trouble == NULL;
+    return trouble;
+}
+
+static void give_reading(plr_session *session, const reading *raw) {
+    plr_imu imu;
+    for (unsigned i = 0; i < 3; ++i) {
+        imu.a_B_mps2[i] = raw->accel[i] * imu_accel_unit;
+        imu.w_B_radps[i] = raw->gyro[i] * imu_gyro_unit;
+    }
+    (void)plr_session_inertial(session, (plr_time_ns)raw->t_ns, &imu);
+}
+
+static void give_readings(plr_session *session, uint64_t until_ns) {
+    reading one;
+    for (unsigned i = 0; i < READINGS_AT_ONCE && readings_take(&queue, until_ns, &one); ++i) {
+        give_reading(session, &one);
+    }
+}
+
+static plr_picture picture(const uint8_t *pixels, uint64_t t_ns) {
+    return (plr_picture){.pixels = pixels,
+                         .stride = WIDTH,
+                         .width_px = WIDTH,
+                         .height_px = HEIGHT,
+                         .t_ns = (plr_time_ns)t_ns};
+}
+
+static void expose_by(const uint8_t *pixels) {
+    uint32_t sum = 0, count = 0;
+    for (unsigned at = 0; at < PIXELS; at += PROBE * WIDTH) {
+        for (unsigned x = 0; x < WIDTH; x += PROBE) {
+            sum += pixels[at + x];
+            ++count;
+        }
+    }
+    const uint16_t next = exposure_next(exposure, sum / count, EXPOSURE_MOST);
+    if (next != exposure) {
+        exposure = next;
+        camera_expose(next);
+    }
+}
+
+void sensors_step(plr_session *session) {
+    if (!started) {
+        return;
+    }
+    const uint64_t late_ns = moments_now_ns() - CAMERA_LATE_NS; /* before a pair is looked for */
+    const capture_pair *there = capture_take(&pairs);
+    give_readings(session, there != NULL ? there->t_ns : late_ns);
+    if (there != NULL) {
+        const plr_picture_pair pair = {picture(there->left, there->t_ns),
+                                       picture(there->right, there->t_ns)};
+        (void)plr_session_look(session, &pair);
+        expose_by(there->left);
+    }
+}
