@@ -370,9 +370,9 @@ static bool solve(const plr_search_point *best, plr_real *U, plr_real dz[PLR_POS
 }
 
 /* Trims what the gate rejects at the best point. True if that is not what was trimmed before, and the others
- * are most of all and tell a motion alone: what most reject is not the motion, and few fit anything. */
+ * are enough to tell a motion alone: few points fit anything. */
 static bool trim_rejected(plr_search *s, const plr_real *U, const plr_real dz[PLR_POSE_DIM]) {
-    unsigned active = 0, rejected = 0;
+    unsigned kept = 0;
     bool changed = false;
     for (unsigned i = 0; i < s->count; i++) {
         plr_residual *at = &s->residuals[i];
@@ -384,10 +384,9 @@ static bool trim_rejected(plr_search *s, const plr_real *U, const plr_real dz[PL
                                             gate_d2(s, i, U, dz, e, &share), residual_norm2(s, i));
         changed = changed || accepted == at->trimmed;
         at->trimmed = !accepted;
-        rejected += !accepted;
-        active++;
+        kept += accepted;
     }
-    return changed && 2 * rejected < active && active - rejected >= MIN_AGREEING;
+    return changed && kept >= MIN_AGREEING;
 }
 
 /* Goes on without what the gate rejects, at most twice: Huber's function bounds the pull of a point and does

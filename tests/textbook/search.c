@@ -405,7 +405,7 @@ static void hush_outliers(search *s) {
             s->sights[i].active = 0;
 }
 
-/* True if others are left out than before, and those who stay are most of all and tell a motion alone. */
+/* True if others are left out than before, and those who stay tell a motion alone. */
 static bool leave_rejected_out(search *s, const sum *best) {
     unsigned same = 0, part = 0, out = 0;
     for (unsigned i = 0; i < s->count; i++) {
@@ -419,7 +419,7 @@ static bool leave_rejected_out(search *s, const sum *best) {
         same += at->left_out == before;
         out += at->left_out;
     }
-    return same < part && 2 * out < part && part - out >= ENOUGH;
+    return same < part && part - out >= ENOUGH;
 }
 
 /* From where all have pulled, on without what the gate rejects there; and once more. */
