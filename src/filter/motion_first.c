@@ -369,8 +369,8 @@ static bool solve(const plr_search_point *best, plr_real *U, plr_real dz[PLR_POS
     return true;
 }
 
-/* Trims what the gate rejects at the best point. True if that is not what was trimmed before, and the others
- * are enough to tell a motion alone: few points fit anything. */
+/* Trims what the gate rejects at the best point, of those that do not have their full weight there. True if
+ * that is not what was trimmed before, and the others are enough to tell a motion alone: few fit anything. */
 static bool trim_rejected(plr_search *s, const plr_real *U, const plr_real dz[PLR_POSE_DIM]) {
     unsigned kept = 0;
     bool changed = false;
@@ -380,8 +380,9 @@ static bool trim_rejected(plr_search *s, const plr_real *U, const plr_real dz[PL
         if (!(at->active > 0))
             continue;
         const bool accepted =
-            !at->behind && plr_gate_accepts(s->f, s->opens_fixed_gate,
-                                            gate_d2(s, i, U, dz, e, &share), residual_norm2(s, i));
+            at->weight >= 1 || (!at->behind && plr_gate_accepts(s->f, s->opens_fixed_gate,
+                                                                gate_d2(s, i, U, dz, e, &share),
+                                                                residual_norm2(s, i)));
         changed = changed || accepted == at->trimmed;
         at->trimmed = !accepted;
         kept += accepted;

@@ -414,8 +414,8 @@ static bool leave_rejected_out(search *s, const sum *best) {
             continue;
         part++;
         const bool before = at->left_out;
-        at->left_out =
-            !observe_accepts(s->t, judge(s->t, at, best, true), residual_norm2(s->t, at));
+        at->left_out = at->weight < 1 && !observe_accepts(s->t, judge(s->t, at, best, true),
+                                                          residual_norm2(s->t, at));
         same += at->left_out == before;
         out += at->left_out;
     }
