@@ -46,7 +46,7 @@ stlink | cmsis-dap | jlink) ;;
 *) die "no probe $probe: stlink, cmsis-dap or jlink" ;;
 esac
 [ -r "$image.bin" ] && [ -r "$image.elf" ] ||
-    die "$image.bin or .elf is not there: tools/robot-demo.sh stm32f405 builds it"
+    die "$image.bin or .elf is not there: cmake --build build/robot --target $(basename "$image") makes it"
 case $(basename "$image") in
 *stm32f405*) target=stm32f4x ;;
 *stm32h743*) target=stm32h7x ;;

@@ -105,7 +105,8 @@ def test_white_noise_moves_halves_as_far_as_their_covariances_say(
     assert min(found.before.by_way.values()) > 0.5
     assert found.before.ratio < found.before.by_chance
     small = halves_alike.inflate(parts, noises(0.25))  # sigmas that are all too small
-    assert 4 < small.times < 6.5  # the gate cuts what it sees: 4.6 to 5.6 on six such drives
+    # 4 is due; the gate cuts what it sees, and on six such drives 4.6 to 5.6 were found.
+    assert 3.5 < small.times < 6.5
 
 
 def test_errors_that_points_keep_widen_the_covariance_and_leave_the_estimate(

@@ -20,14 +20,16 @@ from typing import Any
 import cv2
 import judge
 import numpy as np
-from opencv_tracker.matching import LEVELS, QUALITY  # eyes has named the folder
-from opencv_tracker.settings import Settings
 from pelorus.converters import euroc
 from pelorus.converters.streams import Asked, Pictures, Readings
 from pelorus.tracker import Tracker
 from pelorus.wire.layout import Floats
 
 import eyes
+
+sys.path.insert(0, str(judge.ROOT / "tests/python"))
+from opencv_tracker.matching import LEVELS, QUALITY
+from opencv_tracker.settings import Settings
 
 Pair = tuple[eyes.Gray, eyes.Gray]
 SETTINGS = Settings()

@@ -18,7 +18,13 @@ static void core_write_barrier(void) {
 
 #include "../../port/cortex_m/drivers/stm32h7_usart.c"
 
-enum { DMA1 = 0x40020000, DMAMUX1 = 0x40020800, REGISTERS = 0x1000 / 4, SENT = 16384, REQUEST = 44 };
+enum {
+    DMA1 = 0x40020000,
+    DMAMUX1 = 0x40020800,
+    REGISTERS = 0x1000 / 4,
+    SENT = 16384,
+    REQUEST = 44
+};
 
 static struct {
     volatile uint32_t registers[REGISTERS];

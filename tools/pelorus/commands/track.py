@@ -14,6 +14,7 @@ from pelorus.errors import PelorusError, resolved
 from pelorus.eyes.front_end import CORNERS, Eyes, Shown
 from pelorus.eyes.front_end import track as track_all
 from pelorus.io.tracks import Tracks
+from pelorus.native import vision
 from pelorus.program.console import out, progress
 from pelorus.tracking import images, output, sheet
 from pelorus.tracking.images import Gray, Pair
@@ -55,6 +56,9 @@ def track(
     By the tracker that the robot runs (docs/EYES.md): the filter admits a track that is seen in
     three frames; shorter ones are written, too.
     """
+    most = vision.limits().tracks
+    if not 1 <= corners <= most:
+        raise PelorusError(f"corners {corners}: 1 to {most} are possible in this build")
     if times is not None and rate is not None:
         raise typer.BadParameter("one of them, not both", param_hint="--times / --rate")
     _require_places(target, sheet_file)
@@ -67,6 +71,10 @@ def track(
         out.print(escape(remark))
     first, _ = images.read(pairs[0], bits=bits)
     size = first.shape[1], first.shape[0]
+    if not 0 <= disparity_max <= size[0]:
+        raise PelorusError(
+            f"disparity-max {disparity_max}: 0 to {size[0]}, the width of the pictures, is expected"
+        )
     eyes = Eyes(None, size, corners=corners, disparity_max_px=disparity_max)
     shown_pairs = zip(t_ns.tolist(), _read(pairs, bits, shown), strict=True)
     tracks = track_all((Shown(t, *pair) for t, pair in shown_pairs), eyes, (left, right))

@@ -203,9 +203,10 @@ def converted(
     `timing` overrides the calibration's. Without all six velocities only the tracks can be judged.
     A drive by an IMU is judged, not mended.
     """
+    if timing is not None:  # of the twists that eyes are told, too
+        header = replace(found.calibrated.header, twist_timing=timing)
+        found = replace(found, calibrated=replace(found.calibrated, header=header))
     made, placed = _made(found)
-    if timing is not None:
-        made = made.with_header(twist_timing=timing)
     if found.on_earth and found.truth is None:
         made, finding = earth_start.started(made)
         placed = [*placed, finding]
