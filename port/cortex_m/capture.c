@@ -75,7 +75,8 @@ const capture_pair *capture_take(capture *c) {
     for (unsigned i = 0; i < 2; ++i) {
         if (c->pairs[i].state == CAPTURE_HELD) {
             c->pairs[i].state = CAPTURE_FREE;
-        } else if (c->pairs[i].state == CAPTURE_FULL) {
+        } else if (c->pairs[i].state == CAPTURE_FULL &&
+                   (full == NULL || c->pairs[i].t_ns < full->t_ns)) {
             full = &c->pairs[i];
         }
     }

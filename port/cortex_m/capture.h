@@ -66,7 +66,7 @@ static inline unsigned capture_bank(const capture *c) {
  * was overwritten meanwhile. */
 void capture_strip(capture *c, const volatile uint32_t *strip, unsigned (*written_now)(void));
 
-/* Loop: the pair that is full, or NULL. The one that was handed out before is free from now on. */
+/* Loop: the oldest pair that is full, or NULL. The one that was handed out before is free from now on. */
 const capture_pair *capture_take(capture *c);
 
 #endif

@@ -6,7 +6,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { READINGS = 64 }; /* a power of two; 0.3 s at 200 Hz, of which a frame takes a sixth */
+enum {
+    READINGS = 128
+}; /* a power of two; 0.64 s at 200 Hz: a cut link may hold the loop for half a second */
 
 /* As the chip has it. */
 typedef struct reading {

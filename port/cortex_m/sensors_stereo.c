@@ -22,6 +22,7 @@ enum {
     EXPOSURE_MOST = 315,  /* 10 ms */
     TRIES = 3,            /* at a start in step */
     PROBE = 16,           /* of each so many rows and columns one pixel tells the exposure */
+    SETTLES = 2,          /* pictures that may still have the exposure before */
     READINGS_AT_ONCE = READINGS
 };
 
@@ -39,6 +40,7 @@ static uint32_t second_pair[2][PIXELS / 4] __attribute__((section(".pictures2"))
 static capture pairs;
 static readings queue;
 static uint16_t exposure;
+static unsigned settling;
 static bool started;
 
 plr_eyes *firmware_eyes(void) {
@@ -68,6 +70,10 @@ static const capture_pair *next_pair_within(uint64_t ns) {
     return NULL;
 }
 
+static bool is_even(const uint8_t *pixels) {
+    return memcmp(pixels, pixels + 1, PIXELS - 1) == 0;
+}
+
 /* Both sensors send the same pattern: read out in step they give the same pixels. One clock out of step, and each
  * right picture would be shifted. */
 static const char *check_in_step(void) {
@@ -77,12 +83,14 @@ static const char *check_in_step(void) {
         trouble = camera_start(&pairs, true);
         const capture_pair *pair = trouble == NULL ? next_pair_within(PATTERN_NS) : NULL;
         camera_stop();
-        if (pair != NULL && memcmp(pair->left, pair->right, PIXELS) == 0) {
+        if (pair != NULL && !is_even(pair->left) && memcmp(pair->left, pair->right, PIXELS) == 0) {
             return NULL;
         }
-        if (trouble == NULL) {
-            trouble = pair == NULL
-                          ? "no picture comes: look at trigger, clock and synchronisation pins"
+        if (trouble == NULL && pair == NULL) {
+            trouble = "no picture comes: look at trigger, clock and synchronisation pins";
+        } else if (trouble == NULL) {
+            trouble = is_even(pair->left) || is_even(pair->right)
+                          ? "a camera's test pattern does not come: look at its data lines"
                           : "the two cameras are not read out in step: their test patterns differ";
         }
     }
@@ -99,6 +107,7 @@ const char *sensors_start(void) {
     if (trouble == NULL) {
         trouble = camera_start(&pairs, false);
         exposure = EXPOSURE_FIRST;
+        settling = SETTLES;
         camera_expose(exposure);
     }
     started = trouble == NULL;
@@ -129,8 +138,13 @@ static plr_picture picture(const uint8_t *pixels, uint64_t t_ns) {
                          .t_ns = (plr_time_ns)t_ns};
 }
 
+/* By a picture's mean grey; after a change not before pictures come that were exposed with it. */
 static void expose_by(const uint8_t *pixels) {
     uint32_t sum = 0, count = 0;
+    if (settling > 0) {
+        --settling;
+        return;
+    }
     for (unsigned at = 0; at < PIXELS; at += PROBE * WIDTH) {
         for (unsigned x = 0; x < WIDTH; x += PROBE) {
             sum += pixels[at + x];
@@ -140,6 +154,7 @@ static void expose_by(const uint8_t *pixels) {
     const uint16_t next = exposure_next(exposure, sum / count, EXPOSURE_MOST);
     if (next != exposure) {
         exposure = next;
+        settling = SETTLES;
         camera_expose(next);
     }
 }

@@ -166,6 +166,7 @@ static plr_real residual_norm2(const plr_search *s, unsigned i) {
 static plr_real gate_d2(const plr_search *s, unsigned i, const plr_real *U,
                         const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real *share) {
     const plr_residual *at = &s->residuals[i];
+    *share = 0;
     const plr_real without_it = U ? leave_one_out(at, U, dz, e, share) : at->prior_d2;
     return (*share >= LEAST_SHARE ? without_it : at->prior_d2) +
            plr_stereo_row_gap_d2(&s->f->camera, plr_search_row(s, i)->seen);
@@ -175,7 +176,7 @@ static plr_real gate_d2(const plr_search *s, unsigned i, const plr_real *U,
 static plr_gate_result judge(plr_search *s, unsigned i, const plr_real *U,
                              const plr_real dz[PLR_POSE_DIM], plr_real *judged_d2) {
     const plr_residual *at = &s->residuals[i];
-    plr_real e[3], share = 0;
+    plr_real e[3], share;
     *judged_d2 = at->prior_d2;
     if (!(at->prior_d2 >= 0) || at->behind)
         return PLR_GATE_REJECTED;
@@ -369,14 +370,15 @@ static bool solve(const plr_search_point *best, plr_real *U, plr_real dz[PLR_POS
     return true;
 }
 
-/* Trims what the gate rejects at the best point, of those that do not have their full weight there. True if
- * that is not what was trimmed before, and the others are enough to tell a motion alone: few fit anything. */
+/* Trims what the gate rejects at the best point. One of full weight stays: it pulls no more than noise does,
+ * whatever the gate says of it. True if others are trimmed than before and what is left is enough to tell a
+ * motion alone (few fit anything); if false, the sums are still those of before. */
 static bool trim_rejected(plr_search *s, const plr_real *U, const plr_real dz[PLR_POSE_DIM]) {
     unsigned kept = 0;
     bool changed = false;
     for (unsigned i = 0; i < s->count; i++) {
         plr_residual *at = &s->residuals[i];
-        plr_real e[3], share = 0;
+        plr_real e[3], share;
         if (!(at->active > 0))
             continue;
         const bool accepted =

@@ -22,14 +22,14 @@ typedef struct plr_residual {
     plr_real range_change;   /* P J^T S^-1 r, third row: the observation's correction of the inverse
                                 range, 1/m */
     plr_real range_variance; /* the variance of the inverse range after that correction */
-    plr_real weight;         /* Huber's: 1, and less for a large residual */
+    plr_real weight;         /* in the sums of the last point: Huber's, 0 to 1; 0: not in them */
     plr_real cost;           /* Huber's rho at the best point */
     plr_real prior_d2;       /* d^2 about the twists' prediction; negative: too uncertain */
     plr_real det_S;          /* of that prediction */
     plr_real active;         /* 1: takes part in the search; 0: a known landmark, or excluded */
     bool behind;             /* at the last point the landmark lies behind the camera */
     bool uncertain;          /* the prediction is too uncertain for a linear correction */
-    bool trimmed;            /* takes no part for now: it fits the last point worst */
+    bool trimmed;            /* takes no part for now: it fits worst, or the gate rejects it */
     uint16_t row;            /* of the frame */
     plr_real twist_d2;       /* |e|^2 at the result of the search with the twists */
 } plr_residual;
@@ -81,7 +81,7 @@ void plr_search_descend(plr_search *s, plr_search_point *best);
  * trimmed squares). At the end all residuals are evaluated at the best point. */
 void plr_search_concentrate(plr_search *s, plr_search_point *best);
 
-/* Takes the trimmed observations out of the sums of `best`, and descends from there without them. */
+/* Makes the sums of `best`, the point evaluated last, anew of what is not trimmed, and descends from there. */
 void plr_search_without_trimmed(plr_search *s, plr_search_point *best);
 
 /* Evaluates all residuals at nu = z, which becomes the best point. */

@@ -54,7 +54,7 @@ enum {
     DCMI_SETTINGS = DCMI_SNAPSHOT | DCMI_14_BITS,
     DMA_REQUEST_DCMI = 75,
     DMA_FIFO_FULL = 1 << 2 | 3, /* through the FIFO, threshold full */
-    DMA_READS = 100000,
+    DMA_READS = 1000,           /* a FIFO of four words is empty within a microsecond */
 
     TICK_HZ = 10000000,
     TICK_NS = 100,
@@ -133,7 +133,8 @@ static bool stream_stops(void) {
 /* Everything anew for each picture, so that one that was cut costs itself alone. */
 static void arm(void) {
     DCMI_CR = DCMI_SETTINGS; /* off: that empties its own FIFO */
-    if (!stream_stops() || !capture_begin(pairs)) {
+    const bool stopped = stream_stops();
+    if (!capture_begin(pairs) || !stopped) {
         return;
     }
     DMA1_PAR(CAMERA_STREAM) = DCMI_DR;

@@ -120,6 +120,7 @@ void imu_data_ready(uint64_t t_ns) {
     }
     if (busy) { /* a transfer that did not end within a period: given up */
         SPI1_CR1 = CR1_SSI;
+        SPI1_IFCR = 0xFF8;
         stm32h7_imu_select(false);
         ++queue->lost;
     }
@@ -135,6 +136,9 @@ static int16_t number(const uint8_t *bytes) {
 void imu_bus_isr(void) {
     uint8_t bytes[LENGTH];
     reading one;
+    if ((SPI1_SR & SR_ENDED) == 0) { /* the interrupt of a transfer that was given up */
+        return;
+    }
     end(bytes, LENGTH);
     if (queue == 0 || !busy) {
         return;

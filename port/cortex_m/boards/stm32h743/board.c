@@ -34,13 +34,14 @@
 #define SYSCFG_PWRCR  CORE_REGISTER(0x5800042CU)
 #define FLASH_ACR     CORE_REGISTER(0x52002000U)
 #define DBGMCU_IDC    CORE_REGISTER(0x5C001000U)
-#define IWDG_KR       CORE_REGISTER(0x58004800U)
-#define IWDG_PR       CORE_REGISTER(0x58004804U)
-#define IWDG_RLR      CORE_REGISTER(0x58004808U)
+/* Of AXI SRAM's port: how it takes reads. */
+#define AXI_TARG7_FN_MOD CORE_REGISTER(0x51008108U)
+#define IWDG_KR          CORE_REGISTER(0x58004800U)
+#define IWDG_PR          CORE_REGISTER(0x58004804U)
+#define IWDG_RLR         CORE_REGISTER(0x58004808U)
 
 #define GPIO(port, offset) CORE_REGISTER(0x58020000U + 0x400U * (port) + (offset))
 
-#define MPU_CTRL    CORE_REGISTER(0xE000ED94U)
 #define MPU_RNR     CORE_REGISTER(0xE000ED98U)
 #define MPU_RBAR    CORE_REGISTER(0xE000ED9CU)
 #define MPU_RASR    CORE_REGISTER(0xE000EDA0U)
@@ -162,6 +163,7 @@ static bool raises_voltage(bool fast) {
         RCC_APB4ENR |= 1U << 1; /* SYSCFG */
         (void)RCC_APB4ENR;
         SYSCFG_PWRCR |= PWRCR_ODEN;
+        (void)SYSCFG_PWRCR;
     }
     return waits(&PWR_D3CR, D3CR_VOSRDY, D3CR_VOSRDY);
 }
@@ -205,7 +207,7 @@ static uint32_t start_clocks(void) {
 }
 
 uint32_t stm32h7_timer_hz(void) {
-    return core_hz / 2;
+    return core_hz == HSI_HZ ? HSI_HZ : core_hz / 2;
 }
 
 bool stm32h7_has_crystal(void) {
@@ -299,6 +301,10 @@ static void switch_peripherals_on(void) {
 }
 
 void board_init(void) {
+    if (DBGMCU_IDC >> 16 < 0x2000) {
+        AXI_TARG7_FN_MOD =
+            1; /* revision Y: reads of AXI SRAM one by one, for they may be corrupt (ES0392) */
+    }
     const uint32_t apb_hz = start_clocks();
     switch_peripherals_on();
     set_regions();
