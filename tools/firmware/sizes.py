@@ -423,11 +423,11 @@ def differences(old: str, new: str, capacities: list[int]) -> list[str]:
 
 
 def measure_all(build: Path, capacities: list[int]) -> list[Cost]:
-    """Measures every firmware image of these capacities with a bench image."""
+    """Measures every firmware image of these capacities with a bench image and an emulator."""
     found = []
     for path in (build / "images").glob(f"bench-{PROCESSES[0].name}-*-n*.elf"):
         _, _, board, capacity = path.stem.split("-")
-        if int(capacity[1:]) in capacities:
+        if int(capacity[1:]) in capacities and board in MACHINES:
             found.append((list(MACHINES).index(board), int(capacity[1:]), board))
     if not found:
         raise PelorusError(f"{build}/images: no bench images; tools/sizes.sh builds them")
