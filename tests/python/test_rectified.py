@@ -4,28 +4,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from followed_pairs import followed_in
 from pelorus.errors import PelorusError
-from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.io.tracks import Tracks
 from pelorus.tracking.images import Gray
 from rendered import texture
 
 WIDTH, HEIGHT, DISPARITY_PX = 320, 160, 17
 FRAMES, STEP_PX = 12, 2
-WHERE = Path("left"), Path("right")
 FEW = 50
 Pair = tuple[Gray, Gray]
 
 
 def followed(pairs: list[Pair]) -> Tracks:
     """Returns the tracks as pelorus track makes them."""
-    timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
-    return track(timed, Eyes(None, (WIDTH, HEIGHT), corners=FEW), WHERE)
+    return followed_in(pairs, FEW)
 
 
 def wall(seed: int, frame: int = 0) -> Pair:

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from converted import Run
 from draws import long_run
+from followed_pairs import WHERE, followed_in
 from numpy.typing import NDArray
 from opencv_tracker import tracker
 from opencv_tracker.settings import Settings
 from pelorus.check.checked import Checked, check, config_text
 from pelorus.check.contents import recording_of
 from pelorus.evaluate.evaluation import assess
-from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.named import judged_of
 from pelorus.faults.two_views import two_views
@@ -44,7 +44,6 @@ WIDTH, HEIGHT = 400, 200
 FRAMES, RATE_HZ, SPEED_MPS = 10, 10.0, 2.0
 WALL_M, BOARD_M, BOARD_HALF_M = 12.0, 5.0, 1.3  # a board stands before a wall
 DRAWS, FEW, MANY = 5, 60, 200
-WHERE = Path("left"), Path("right")
 MISSES = 5  # PLR_VISION_MISSES: pairs that a track may be unseen
 
 
@@ -97,9 +96,7 @@ def write(folder: Path, pairs: Frames) -> tuple[Path, Path]:
 
 def followed(pairs: Frames, corners: int = FEW) -> Tracks:
     """Returns the tracks as pelorus track makes them."""
-    height, width = pairs[0][0].shape
-    timed = (Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs))
-    return track(timed, Eyes(None, (width, height), corners=corners), WHERE)
+    return followed_in(pairs, corners)
 
 
 def in_world(tracks: Tracks) -> NDArray[np.float64]:

@@ -4,16 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from followed_pairs import WHERE, followed_in
 from numpy.typing import NDArray
 from opencv_tracker import patches
 from opencv_tracker.settings import Settings
 from opencv_tracker.tracker import track as track_by_opencv
-from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.io.tracks import Tracks
 from pelorus.tracking import images
 
@@ -25,7 +24,6 @@ AHEAD = 1.03  # a wall ahead grows by so much from one frame to the next
 TURN_DEG = 0.5  # and turns
 FRAMES = 12
 DISPARITY_PX = 8.0
-WHERE = Path("left"), Path("right")
 Pair = tuple[images.Gray, images.Gray]
 
 
@@ -88,11 +86,6 @@ def test_a_patch_that_has_doubled_is_cut_anew_and_others_are_kept() -> None:
     assert np.array_equal(renewed.A, np.tile(np.eye(2), (2, 1, 1)))
 
 
-def by_eyes(pairs: list[Pair]) -> Tracks:
-    timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
-    return track(timed, Eyes(None, (SIDE_PX, SIDE_PX)), WHERE)
-
-
 def by_opencv(pairs: list[Pair]) -> Tracks:
     return track_by_opencv(pairs, WHERE, Settings())
 
@@ -129,7 +122,7 @@ def wander_px(follow: Callable[[list[Pair]], Tracks]) -> tuple[float, float]:
 def test_tracks_do_not_wander_from_the_point_of_their_birth(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for follow in (by_eyes, by_opencv):
+    for follow in (followed_in, by_opencv):
         young, old = wander_px(follow)
         assert old < 0.1
         assert young < 0.1

@@ -23,8 +23,6 @@ from pathlib import Path
 
 import judge
 import numpy as np
-from pelorus.eyes.front_end import Eyes, Shown
-from pelorus.eyes.front_end import track as track_alone
 from pelorus.io import trajectory
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
@@ -38,6 +36,7 @@ from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(judge.ROOT / "tests/python"))
 
+from followed_pairs import followed_in
 from opencv_tracker.settings import Settings
 from opencv_tracker.tracker import track
 
@@ -125,9 +124,7 @@ def main() -> int:
     sides = folder / "image_l", folder / "image_r"
     pairs = [images.read(pair) for pair in images.pairs(*sides)]
     judged = track(pairs, sides, Settings(corners=given.points))
-    height, width = pairs[0][0].shape
-    timed = [Shown(100_000_000 * k, *pair) for k, pair in enumerate(pairs)]
-    alone = track_alone(timed, Eyes(None, (width, height), corners=given.points), sides)
+    alone = followed_in(pairs, given.points, sides)
     rows: dict[str, list[list[float]]] = {"eyes": [], "alone": [], "OpenCV": []}
     told = ""
     for drive in drives(folder, given.draws):

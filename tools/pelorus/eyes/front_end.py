@@ -87,7 +87,7 @@ class Eyes:
             middle = (width - 1) / 2, (height - 1) / 2
             focal = UNKNOWN_FOCAL * width
             camera = Camera(focal, focal, *middle, UNKNOWN_BASELINE_M)
-        most = vision.limits()[0]
+        most = vision.limits().pixels
         self._times = next(k for k in range(1, width + 1) if (width // k) * (height // k) <= most)
         taken = rig is not None and self._times == 1 and is_followed(rig.left, rig.right)
         how: dict[str, Any] = {
