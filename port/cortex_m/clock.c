@@ -47,3 +47,9 @@ uint64_t clock_ns(void) {
     const uint64_t seconds = ticks / frequency;
     return seconds * 1000000000U + ticks % frequency * 1000000000U / frequency;
 }
+
+void clock_wait_ms(uint32_t ms) {
+    const uint64_t start_ns = clock_ns();
+    while (clock_ns() - start_ns < (uint64_t)ms * 1000000U) {
+    }
+}

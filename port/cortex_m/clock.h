@@ -11,4 +11,7 @@ void clock_start(uint32_t core_hz);
 /* Nanoseconds since clock_start; resolution: one core clock. Ascends. */
 uint64_t clock_ns(void);
 
+/* Comes back after so many milliseconds. */
+void clock_wait_ms(uint32_t ms);
+
 #endif

@@ -6,9 +6,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum {
-    READINGS = 128
-}; /* a power of two; 0.64 s at 200 Hz: a cut link may hold the loop for half a second */
+/* A power of two; 0.64 s at 200 Hz: a cut link may hold the loop for half a second. */
+enum { READINGS = 128 };
 
 /* As the chip has it. */
 typedef struct reading {

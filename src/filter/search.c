@@ -122,13 +122,11 @@ static plr_real d2_by_best_covariance(const plr_residual *at, unsigned best) {
     return plr_dot3(r, r);
 }
 
-static plr_real huber_weight(plr_real d2) {
-    return d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2);
-}
-
-/* J += w a^T a, b += w a^T e */
-static void add_to_sums(const plr_residual *at, plr_search_point *point) {
+/* J += w a^T a, b += w a^T e, with Huber's weight. */
+static void add_to_sums(plr_residual *at, plr_search_point *point) {
+    const plr_real d2 = plr_dot3(at->e, at->e);
     plr_real *J = point->J;
+    at->weight = d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real column[3] = {at->a[k], at->a[PLR_POSE_DIM + k], at->a[2 * PLR_POSE_DIM + k]};
         point->b[k] = PLR_FMA(at->weight, plr_dot3(column, at->e), point->b[k]);
@@ -176,10 +174,8 @@ static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_sear
             memcpy(at->U[1 - s->current], at->U[s->current], sizeof at->U[0]);
             continue;
         }
-        const plr_real d2 = plr_dot3(at->e, at->e);
         if (!(at->active > 0) || at->trimmed)
             continue;
-        at->weight = huber_weight(d2);
         change += huber(d2_by_best_covariance(at, s->current)) - at->cost;
         add_to_sums(at, point);
     }
@@ -298,9 +294,8 @@ void plr_search_without_trimmed(plr_search *s, plr_search_point *best) {
     memset(best->b, 0, sizeof best->b);
     for (unsigned i = 0; i < s->count; i++) {
         plr_residual *at = &s->residuals[i];
-        const bool counts = at->active > 0 && !at->trimmed && !at->behind;
-        at->weight = counts ? huber_weight(plr_dot3(at->e, at->e)) : PLR_R(0);
-        if (counts)
+        at->weight = 0;
+        if (at->active > 0 && !at->trimmed && !at->behind)
             add_to_sums(at, best);
     }
     plr_search_descend(s, best);

@@ -96,12 +96,15 @@ static void take_motion(const plr_vision *v, const plr_expected *e, const plr_pi
         for (int i = 0; i < 9; i++)
             m->R[i] = (plr_real)e->motion.R[i], m->p[i / 3] = (plr_real)e->motion.p[i / 3];
     m->place_known = plr_dot3(m->p, m->p) > 0;
-    const plr_real rate = e->velocity_known ? PLR_R(0) : (plr_real)(1e9 / (double)(left - v->t_ns));
-    plr_turn_of(m->w, m->R);
-    for (int i = 0; i < 3; i++) {
-        m->w[i] = e->velocity_known ? -(plr_real)e->w_C_radps[i] : m->w[i] * rate;
-        m->u[i] = e->velocity_known ? -(plr_real)e->v_C_mps[i] : m->p[i] * rate;
+    if (e->velocity_known) {
+        for (int i = 0; i < 3; i++)
+            m->w[i] = -(plr_real)e->w_C_radps[i], m->u[i] = -(plr_real)e->v_C_mps[i];
+        return;
     }
+    const plr_real rate = (plr_real)(1e9 / (double)(left - v->t_ns));
+    plr_turn_of(m->w, m->R);
+    for (int i = 0; i < 3; i++)
+        m->w[i] *= rate, m->u[i] = m->p[i] * rate;
 }
 
 /* The depth that the caller knows, as a disparity. */

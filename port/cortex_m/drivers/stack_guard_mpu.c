@@ -3,11 +3,6 @@
 #include "../core.h"
 #include "../stack_guard.h"
 
-#define MPU_CTRL CORE_REGISTER(0xE000ED94U)
-#define MPU_RNR  CORE_REGISTER(0xE000ED98U)
-#define MPU_RBAR CORE_REGISTER(0xE000ED9CU)
-#define MPU_RASR CORE_REGISTER(0xE000EDA0U)
-
 enum {
     CTRL_ENABLE = 1 << 0,
     CTRL_ELSE_AS_USUAL = 1 << 2, /* PRIVDEFENA: the default memory map outside the regions */

@@ -175,12 +175,6 @@ void camera_strip_isr(void) {
 
 /* --- both sensors --- */
 
-static void wait_ms(uint32_t ms) {
-    const uint64_t start_ns = clock_ns();
-    while (clock_ns() - start_ns < (uint64_t)ms * 1000000U) {
-    }
-}
-
 static void begin_triggers(void) {
     TIM4_PSC = stm32h7_timer_hz() / TRIGGER_HZ - 1;
     TIM4_ARR = TRIGGER_PERIOD - 1;
@@ -199,9 +193,9 @@ const char *camera_start(capture *into, bool pattern) {
         return "strips are longer than their memory";
     }
     stm32h7_cameras_reset(true);
-    wait_ms(1);
+    clock_wait_ms(1);
     stm32h7_cameras_reset(false);
-    wait_ms(1);
+    clock_wait_ms(1);
     stm32h7_i2c_start();
     if (!mt9v034_start(LEFT, pattern, stm32h7_i2c_write, stm32h7_i2c_read)) {
         return "no MT9V034 answers as the left camera (0x5C on I2C1)";

@@ -84,12 +84,6 @@ static bool sets(uint8_t where, uint8_t value) {
     return transfers(where, &value);
 }
 
-static void wait_ms(uint32_t ms) {
-    const uint64_t start_ns = clock_ns();
-    while (clock_ns() - start_ns < (uint64_t)ms * 1000000U) {
-    }
-}
-
 const char *imu_start(readings *into) {
     uint8_t who = 0;
     queue = 0;
@@ -99,13 +93,13 @@ const char *imu_start(readings *into) {
     SPI1_CFG2 = CFG2_HOLDS | CFG2_SSM | CFG2_MASTER;
     stm32h7_imu_select(false);
     (void)sets(DEVICE_CONFIG, 1);
-    wait_ms(2);
+    clock_wait_ms(2);
     if (!transfers(WHO_AM_I | READ, &who) || who != ICM_42688_P) {
         return "no ICM-42688-P answers as the IMU (SPI1)";
     }
     bool good = sets(INT_CONFIG, 3) && sets(INT_CONFIG1, 0) && sets(GYRO_CONFIG0, 7) &&
                 sets(ACCEL_CONFIG0, 7) && sets(PWR_MGMT0, 0xF);
-    wait_ms(50); /* the gyro's start */
+    clock_wait_ms(50); /* the gyro's start */
     good = good && sets(INT_SOURCE0, 8);
     busy = false;
     queue = good ? into : 0;

@@ -8,6 +8,7 @@
 
 #include "../../core.h"
 #include "../../drivers/stm32_flash.h"
+#include "../../drivers/stm32_iwdg.h"
 #include "../../drivers/stm32_usart.h"
 #include "../../serial.h"
 #include "../../startup.h"
@@ -23,11 +24,9 @@
 #define GPIOA_PUPDR CORE_REGISTER(0x4002000CU)
 #define GPIOA_AFRL  CORE_REGISTER(0x40020020U)
 #define GPIOA_AFRH  CORE_REGISTER(0x40020024U)
-#define IWDG_KR     CORE_REGISTER(0x40003000U)
-#define IWDG_PR     CORE_REGISTER(0x40003004U)
-#define IWDG_RLR    CORE_REGISTER(0x40003008U)
 
 enum {
+    IWDG = 0x40003000,
     HSI_HZ = 16000000,
     PLL_HZ = 168000000,
     APB1_DIVIDER = 4, /* of the PLL's clock: 42 MHz is the most it takes */
@@ -125,14 +124,11 @@ uint32_t board_core_hz(void) {
  * more than the 2 s for which an erase of the storage may stop the core. It resets at once; it has no
  * interrupt to report from. */
 void board_watchdog_start(void) {
-    IWDG_KR = 0x5555;
-    IWDG_PR = 4;
-    IWDG_RLR = 2250 - 1;
-    IWDG_KR = 0xCCCC;
+    stm32_iwdg_start(IWDG, 2250);
 }
 
 void board_watchdog_feed(void) {
-    IWDG_KR = 0xAAAA;
+    stm32_iwdg_feed(IWDG);
 }
 
 bool board_storage(plr_block_device *device) {

@@ -9,6 +9,7 @@
 #include "../../board.h"
 
 #include "../../core.h"
+#include "../../drivers/stm32_iwdg.h"
 #include "../../drivers/stm32h7.h"
 #include "../../drivers/stm32h7_usart.h"
 #include "../../serial.h"
@@ -36,21 +37,16 @@
 #define DBGMCU_IDC    CORE_REGISTER(0x5C001000U)
 /* Of AXI SRAM's port: how it takes reads. */
 #define AXI_TARG7_FN_MOD CORE_REGISTER(0x51008108U)
-#define IWDG_KR          CORE_REGISTER(0x58004800U)
-#define IWDG_PR          CORE_REGISTER(0x58004804U)
-#define IWDG_RLR         CORE_REGISTER(0x58004808U)
 
 #define GPIO(port, offset) CORE_REGISTER(0x58020000U + 0x400U * (port) + (offset))
 
-#define MPU_RNR     CORE_REGISTER(0xE000ED98U)
-#define MPU_RBAR    CORE_REGISTER(0xE000ED9CU)
-#define MPU_RASR    CORE_REGISTER(0xE000EDA0U)
 #define SCB_CCSIDR  CORE_REGISTER(0xE000ED80U)
 #define SCB_CSSELR  CORE_REGISTER(0xE000ED84U)
 #define SCB_ICIALLU CORE_REGISTER(0xE000EF50U)
 #define SCB_DCISW   CORE_REGISTER(0xE000EF60U)
 
 enum {
+    IWDG = 0x58004800,
     HSI_HZ = 64000000,
     REVISION_V = 0x2003, /* in the upper half of DBGMCU_IDC */
 
@@ -301,9 +297,9 @@ static void switch_peripherals_on(void) {
 }
 
 void board_init(void) {
+    /* Revision Y: reads of AXI SRAM one by one, for they may be corrupt otherwise (ES0392). */
     if (DBGMCU_IDC >> 16 < 0x2000) {
-        AXI_TARG7_FN_MOD =
-            1; /* revision Y: reads of AXI SRAM one by one, for they may be corrupt (ES0392) */
+        AXI_TARG7_FN_MOD = 1;
     }
     const uint32_t apb_hz = start_clocks();
     switch_peripherals_on();
@@ -330,14 +326,11 @@ uint32_t board_core_hz(void) {
 
 /* The independent watchdog runs from its own oscillator of some 32 kHz: 64 * 1000 of its clocks are 2 s. */
 void board_watchdog_start(void) {
-    IWDG_KR = 0x5555;
-    IWDG_PR = 4;
-    IWDG_RLR = 1000 - 1;
-    IWDG_KR = 0xCCCC;
+    stm32_iwdg_start(IWDG, 1000);
 }
 
 void board_watchdog_feed(void) {
-    IWDG_KR = 0xAAAA;
+    stm32_iwdg_feed(IWDG);
 }
 
 bool board_storage(plr_block_device *device) {
