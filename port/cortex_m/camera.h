@@ -13,13 +13,17 @@
 const char *moments_start(void);
 uint64_t moments_now_ns(void);
 
-/* Sets both cameras up and begins to trigger them; `pattern`: they send a test pattern in place of what they see.
- * What is wrong, or NULL. Each strip has `rows` rows. */
-const char *camera_start(capture *pairs, bool pattern);
+/* Sets both cameras up, exposes by so many rows and begins to trigger them; `pattern`: they send a test pattern in
+ * place of what they see. What is wrong, or NULL. */
+const char *camera_start(capture *pairs, bool pattern, uint16_t exposure_rows);
 void camera_stop(void);
 
-/* Rows of exposure from the next picture on, the same for both. */
-void camera_expose(uint16_t rows);
+/* Whether no picture is exposed or read out, and none begins before camera_expose would be through. */
+bool camera_rests(void);
+
+/* Rows of exposure from now on, of one camera after the other: call it while they rest. False: one of them did not
+ * take it, or a picture began between; pictures may then be exposed differently until a call that succeeds. */
+bool camera_expose(uint16_t rows);
 
 /* Starts readings into a queue. What is wrong, or NULL. */
 const char *imu_start(readings *queue);

@@ -31,6 +31,8 @@ enum {
 #define CAMERA_LATE_NS UINT64_C(30000000)
 /* Within which some pattern must come: a picture does every 50 ms. */
 #define PATTERN_NS UINT64_C(500000000)
+/* After which a camera that did not take its exposure is told again. */
+#define TELL_AGAIN_NS UINT64_C(100000000)
 
 const uint32_t sensors_output = PLR_OUTPUT_ECHO;
 
@@ -39,9 +41,17 @@ static uint32_t first_pair[2][PIXELS / 4] __attribute__((section(".bss.pictures"
 static uint32_t second_pair[2][PIXELS / 4] __attribute__((section(".pictures2")));
 static capture pairs;
 static readings queue;
-static uint16_t exposure;
-static unsigned settling;
 static bool started;
+
+/* Of both cameras, in rows. */
+static struct {
+    uint16_t rows;     /* 0: one of them may have another */
+    uint16_t wanted;   /* by the light */
+    uint64_t since_ns; /* pictures before it tell nothing of `rows` */
+    unsigned settling; /* pictures since then that may still have the exposure before */
+    bool apart; /* one camera may be exposed otherwise than the other: the pair is left out */
+    uint32_t left_out; /* such pairs, for a debugger */
+} exposure;
 
 plr_eyes *firmware_eyes(void) {
     return plr_eyes_init(&eyes, NULL, NULL, 0) == PLR_OK ? &eyes : NULL;
@@ -80,7 +90,7 @@ static const char *check_in_step(void) {
     const char *trouble = NULL;
     for (unsigned i = 0; i < TRIES; ++i) {
         clear_pairs();
-        trouble = camera_start(&pairs, true);
+        trouble = camera_start(&pairs, true, EXPOSURE_FIRST);
         const capture_pair *pair = trouble == NULL ? next_pair_within(PATTERN_NS) : NULL;
         camera_stop();
         if (pair != NULL && !is_even(pair->left) && memcmp(pair->left, pair->right, PIXELS) == 0) {
@@ -105,10 +115,9 @@ const char *sensors_start(void) {
         trouble = imu_start(&queue);
     }
     if (trouble == NULL) {
-        trouble = camera_start(&pairs, false);
-        exposure = EXPOSURE_FIRST;
-        settling = SETTLES;
-        camera_expose(exposure);
+        trouble = camera_start(&pairs, false, EXPOSURE_FIRST);
+        memset(&exposure, 0, sizeof exposure);
+        exposure.rows = exposure.wanted = EXPOSURE_FIRST;
     }
     started = trouble == NULL;
     return trouble;
@@ -138,25 +147,47 @@ static plr_picture picture(const uint8_t *pixels, uint64_t t_ns) {
                          .t_ns = (plr_time_ns)t_ns};
 }
 
-/* By a picture's mean grey; after a change not before pictures come that were exposed with it. */
-static void expose_by(const uint8_t *pixels) {
+static uint32_t mean_grey(const uint8_t *pixels) {
     uint32_t sum = 0, count = 0;
-    if (settling > 0) {
-        --settling;
-        return;
-    }
     for (unsigned at = 0; at < PIXELS; at += PROBE * WIDTH) {
         for (unsigned x = 0; x < WIDTH; x += PROBE) {
             sum += pixels[at + x];
             ++count;
         }
     }
-    const uint16_t next = exposure_next(exposure, sum / count, EXPOSURE_MOST);
-    if (next != exposure) {
-        exposure = next;
-        settling = SETTLES;
-        camera_expose(next);
+    return sum / count;
+}
+
+/* What the light asks for; after a change not before pictures come that were exposed with it. */
+static void follow_light(const capture_pair *pair) {
+    if (exposure.rows != exposure.wanted || pair->t_ns < exposure.since_ns) {
+        return;
     }
+    if (exposure.settling > 0) {
+        --exposure.settling;
+        return;
+    }
+    exposure.apart = false;
+    exposure.wanted = exposure_next(exposure.rows, mean_grey(pair->left), EXPOSURE_MOST);
+}
+
+/* Between two pictures, so that both cameras have it from the same one on. */
+static void expose(void) {
+    const uint64_t now_ns = moments_now_ns();
+    if (exposure.rows == exposure.wanted || !camera_rests() ||
+        (exposure.rows == 0 && now_ns - exposure.since_ns < TELL_AGAIN_NS)) {
+        return;
+    }
+    exposure.rows = camera_expose(exposure.wanted) ? exposure.wanted : 0;
+    exposure.apart = exposure.apart || exposure.rows == 0;
+    exposure.since_ns = moments_now_ns();
+    exposure.settling = SETTLES;
+}
+
+static void look(plr_session *session, const capture_pair *there) {
+    const plr_picture_pair pair = {picture(there->left, there->t_ns),
+                                   picture(there->right, there->t_ns)};
+    (void)plr_session_look(session, &pair);
 }
 
 void sensors_step(plr_session *session) {
@@ -167,9 +198,13 @@ void sensors_step(plr_session *session) {
     const capture_pair *there = capture_take(&pairs);
     give_readings(session, there != NULL ? there->t_ns : late_ns);
     if (there != NULL) {
-        const plr_picture_pair pair = {picture(there->left, there->t_ns),
-                                       picture(there->right, there->t_ns)};
-        (void)plr_session_look(session, &pair);
-        expose_by(there->left);
+        follow_light(there);
+    }
+    const bool apart = exposure.apart;
+    expose(); /* now, for a look takes long */
+    if (there != NULL && apart) {
+        ++exposure.left_out;
+    } else if (there != NULL) {
+        look(session, there);
     }
 }

@@ -11,7 +11,13 @@
 
 #define MS UINT64_C(1000000)
 
-enum { STRIPS = HEIGHT / STRIP_ROWS, STRIP_WORDS = STRIP_ROWS * WIDTH / 2 };
+enum {
+    STRIPS = HEIGHT / STRIP_ROWS,
+    STRIP_WORDS = STRIP_ROWS * WIDTH / 2,
+    LATE = 2, /* pictures that still have the exposure before a change */
+    WRITTEN = LATE + 1,
+    APART = 64
+};
 
 const double imu_accel_unit = 0.005, imu_gyro_unit = 0.001;
 
@@ -20,10 +26,16 @@ static struct {
     readings *readings;
     capture *pairs;
     bool pattern, running;
-    unsigned frame, feeds, starts, out_of_step, exposed_rows;
+    unsigned frame, feeds, starts, out_of_step, triggers;
     const char *dead_camera, *dead_imu, *dead_clock;
     uint32_t strip[STRIP_WORDS];
-    uint64_t exposure_ns, readout_ns, exposed_ns;
+    uint64_t readout_ns, exposed_ns;
+    double light; /* grey levels over those of EXPOSURE_FIRST's */
+    /* of exposure, left and right: of this picture, ..., as written */
+    unsigned rows[2][WRITTEN + 1];
+    unsigned writes, deaf; /* the right camera does not take the next so many */
+    unsigned apart;        /* pictures whose exposures differed, and their times */
+    uint64_t apart_ns[APART];
 } world;
 
 /* --- the world --- */
@@ -32,17 +44,42 @@ static unsigned other_bank(void) {
     return 1 - capture_bank(world.pairs);
 }
 
+static uint32_t grey(uint32_t level, unsigned side) {
+    const double exposed = world.light * world.rows[side][0] / EXPOSURE_FIRST * level;
+    return exposed < 127 ? (uint32_t)exposed : 127;
+}
+
 /* Grey levels that no two frames share; the test pattern is the same in both, but for a sensor that is a clock late. */
 static void read_out(void) {
-    const unsigned shift = world.pattern && world.starts <= world.out_of_step;
+    const unsigned shift = world.starts <= world.out_of_step;
     for (unsigned strip = 0; strip < STRIPS; strip++) {
         for (uint32_t i = 0; i < STRIP_WORDS; i++) {
             const uint32_t a = (2 * i + world.frame) % 127, b = (2 * i + 1 + world.frame) % 127;
-            world.strip[i] = a | (a + shift) << 7 | b << 16 | (b + shift) << 23;
+            world.strip[i] =
+                world.pattern ? a | (a + shift) << 7 | b << 16 | (b + shift) << 23
+                              : grey(a, 0) | grey(a, 1) << 7 | grey(b, 0) << 16 | grey(b, 1) << 23;
         }
         capture_strip(world.pairs, world.strip, other_bank);
     }
     world.frame++;
+}
+
+/* The sensors take over what was written so many pictures ago. */
+static void trigger(void) {
+    for (unsigned side = 0; side < 2; side++)
+        for (unsigned i = 0; i < WRITTEN; i++)
+            world.rows[side][i] = world.rows[side][i + 1];
+    const uint64_t exposure_ns = world.rows[0][0] * UINT64_C(32000);
+    const uint64_t middle_ns = world.next_picture_ns + exposure_ns / 2;
+    world.triggers++;
+    if (world.rows[0][0] != world.rows[1][0]) {
+        TEST_ASSERT_TRUE(world.apart < APART);
+        world.apart_ns[world.apart++] = middle_ns;
+    }
+    if (capture_begin(world.pairs)) {
+        world.exposed_ns = world.next_picture_ns + exposure_ns;
+        capture_exposed(world.pairs, middle_ns);
+    }
 }
 
 /* What happens up to now, in its order: a picture is triggered, exposed, read out; readings come. */
@@ -59,10 +96,8 @@ static void play(uint64_t until_ns) {
         }
         if (!world.running || world.now_ns < world.next_picture_ns)
             continue;
-        if (world.exposed_ns == 0 && capture_begin(world.pairs)) {
-            world.exposed_ns = world.next_picture_ns + world.exposure_ns;
-            capture_exposed(world.pairs, world.next_picture_ns + world.exposure_ns / 2);
-        }
+        if (world.exposed_ns == 0)
+            trigger();
         if (world.exposed_ns == 0)
             world.next_picture_ns += 50 * MS;
         else if (world.now_ns >= world.exposed_ns + world.readout_ns) {
@@ -96,7 +131,9 @@ const char *imu_start(readings *queue_of_loop) {
     return world.dead_imu;
 }
 
-const char *camera_start(capture *into, bool pattern) {
+const char *camera_start(capture *into, bool pattern, uint16_t exposure_rows) {
+    for (unsigned i = 0; i <= WRITTEN; i++)
+        world.rows[0][i] = world.rows[1][i] = exposure_rows;
     world.pairs = into;
     world.pattern = pattern;
     world.running = world.dead_camera == NULL;
@@ -110,8 +147,26 @@ void camera_stop(void) {
     world.running = false;
 }
 
-void camera_expose(uint16_t rows) {
-    world.exposed_rows = rows;
+bool camera_rests(void) {
+    return world.exposed_ns == 0 && world.next_picture_ns > world.now_ns + 4 * MS;
+}
+
+/* The last picture of the left camera was exposed as it was last told: only then does its grey level tell
+ * something. */
+bool camera_expose(uint16_t rows) {
+    const unsigned before = world.triggers;
+    if (world.rows[0][WRITTEN] != rows)
+        TEST_ASSERT_EQUAL_UINT(world.rows[0][WRITTEN], world.rows[0][0]);
+    world.writes++;
+    world.rows[0][WRITTEN] = rows;
+    play(world.now_ns + MS / 2);
+    if (world.deaf > 0) {
+        world.deaf--;
+        return false;
+    }
+    world.rows[1][WRITTEN] = rows;
+    play(world.now_ns + MS / 2);
+    return world.triggers == before;
 }
 
 /* --- the tests --- */
@@ -119,7 +174,7 @@ void camera_expose(uint16_t rows) {
 void setUp(void) {
     memset(&world, 0, sizeof world);
     world.now_ns = 1000 * MS;
-    world.exposure_ns = 5 * MS;
+    world.light = 0.75;
     world.readout_ns = 10 * MS;
     memset(&queue, 0, sizeof queue);
     started = false;
@@ -143,7 +198,7 @@ static void test_cameras_in_step_and_an_imu_start(void) {
     TEST_ASSERT_NULL(sensors_start());
     TEST_ASSERT_TRUE(world.running);
     TEST_ASSERT_FALSE(world.pattern);
-    TEST_ASSERT_EQUAL_UINT(EXPOSURE_FIRST, world.exposed_rows);
+    TEST_ASSERT_EQUAL_UINT(EXPOSURE_FIRST, world.rows[0][0]);
     TEST_ASSERT_TRUE(world.feeds > 0);
 }
 
@@ -221,8 +276,7 @@ static void test_a_busy_loop_hands_over_readings_and_pairs_in_order(void) {
     TEST_ASSERT_EQUAL_UINT32(0, pairs.broken);
 }
 
-static void test_before_a_header_nothing_is_handed_over_and_the_exposure_settles(void) {
-    world.exposure_ns = 1 * MS;
+static void test_before_a_header_nothing_is_handed_over(void) {
     options.eyes = firmware_eyes();
     TEST_ASSERT_NULL(sensors_start());
     desk_begin();
@@ -234,4 +288,69 @@ static void test_before_a_header_nothing_is_handed_over_and_the_exposure_settles
     TEST_ASSERT_EQUAL_UINT32(0, queue.lost);
     TEST_ASSERT_EQUAL_UINT32(0, eyes.totals.pairs);
     TEST_ASSERT_TRUE(pairs.done >= 3);
+}
+
+/* --- exposure --- */
+
+/* No pair that was handed over had two exposures. */
+static void assert_exposed_alike(void) {
+    plr_message m;
+    faulty_port_answers_again(&port);
+    while (faulty_port_answer(&port, &m))
+        for (unsigned i = 0; i < world.apart && m.kind == PLR_KIND_STEREO; i++)
+            TEST_ASSERT_TRUE(m.as.stereo.t_ns != world.apart_ns[i]);
+}
+
+static void run_for(uint64_t ns) {
+    const uint64_t end_ns = world.now_ns + ns;
+    while (world.now_ns < end_ns) {
+        sensors_step(&session);
+        play(world.now_ns + MS);
+    }
+}
+
+/* camera_expose above holds that each change comes from a picture with the exposure before it. */
+static void test_a_change_of_light_is_followed_by_one_change_of_exposure_that_is_waited_for(void) {
+    TEST_ASSERT_NULL(sensors_start());
+    begin_session();
+    run_for(500 * MS);
+    TEST_ASSERT_EQUAL_UINT(0, world.writes);
+    world.light = 0.4;
+    run_for(1000 * MS);
+    TEST_ASSERT_EQUAL_UINT(1, world.writes);
+    TEST_ASSERT_TRUE(world.rows[0][0] > EXPOSURE_FIRST * 3 / 2);
+    TEST_ASSERT_EQUAL_UINT(world.rows[0][0], world.rows[1][0]);
+}
+
+static void test_no_picture_begins_between_the_two_cameras_exposures(void) {
+    const double lights[] = {1, 0.5, 1.6, 0.7, 2.5};
+    rng chance = rng_seeded(3);
+    TEST_ASSERT_NULL(sensors_start());
+    begin_session();
+    for (unsigned i = 0; i < 40; i++) {
+        const uint64_t end_ns = world.now_ns + 300 * MS;
+        world.light = lights[i % 5];
+        while (world.now_ns < end_ns) {
+            sensors_step(&session);
+            play(world.now_ns + (uint64_t)(rng_uniform(&chance, 0, 60) * (double)MS));
+        }
+    }
+    TEST_ASSERT_TRUE(world.writes > 20);
+    TEST_ASSERT_EQUAL_UINT(0, world.apart);
+    TEST_ASSERT_EQUAL_UINT32(0, exposure.left_out);
+}
+
+static void test_pairs_with_two_exposures_are_left_out_until_both_cameras_have_taken_it(void) {
+    TEST_ASSERT_NULL(sensors_start());
+    begin_session();
+    run_for(500 * MS);
+    const uint32_t before = eyes.totals.pairs;
+    world.light = 0.4;
+    world.deaf = 5;
+    run_for(2000 * MS);
+    TEST_ASSERT_EQUAL_UINT(6, world.writes);
+    TEST_ASSERT_TRUE(world.apart > 0);
+    TEST_ASSERT_TRUE(exposure.left_out >= world.apart);
+    TEST_ASSERT_TRUE(eyes.totals.pairs > before + 20);
+    assert_exposed_alike();
 }

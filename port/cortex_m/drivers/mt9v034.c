@@ -32,7 +32,8 @@ static const struct {
     {0x07, 1 << 8 | 1 << 7 | 3 << 3}, /* parallel output; snapshots by the pin EXPOSURE */
 };
 
-bool mt9v034_start(uint8_t device, bool pattern, mt9v034_write write, mt9v034_read read) {
+bool mt9v034_start(uint8_t device, bool pattern, uint16_t rows, mt9v034_write write,
+                   mt9v034_read read) {
     uint16_t version = 0;
     if (!read(device, VERSION, &version) || version != VERSION_MT9V034) {
         return false;
@@ -42,7 +43,8 @@ bool mt9v034_start(uint8_t device, bool pattern, mt9v034_write write, mt9v034_re
             return false;
         }
     }
-    return write(device, PATTERN, pattern ? PATTERN_DIAGONAL : 0);
+    return mt9v034_expose(device, rows, write) &&
+           write(device, PATTERN, pattern ? PATTERN_DIAGONAL : 0);
 }
 
 bool mt9v034_expose(uint8_t device, uint16_t rows, mt9v034_write write) {

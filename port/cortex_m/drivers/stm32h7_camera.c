@@ -37,6 +37,7 @@
 #define TIM4_EGR   CORE_REGISTER(0x40000814U)
 #define TIM4_CCMR1 CORE_REGISTER(0x40000818U)
 #define TIM4_CCER  CORE_REGISTER(0x40000820U)
+#define TIM4_CNT   CORE_REGISTER(0x40000824U)
 #define TIM4_PSC   CORE_REGISTER(0x40000828U)
 #define TIM4_ARR   CORE_REGISTER(0x4000082CU)
 #define TIM4_CCR1  CORE_REGISTER(0x40000834U)
@@ -67,6 +68,10 @@ enum {
     TRIGGER_HZ = 10000,   /* what TIM4 counts */
     TRIGGER_PERIOD = 500, /* 50 ms: 20 pictures a second */
     TRIGGER_PULSE = 1,
+    /* Of that period: 10 ms exposed and 20 read out at most, and then rest. Both sensors take an exposure in 2 ms,
+     * and a bus that hangs is given up 32 ms later, still before the next rest. */
+    REST_BEGINS = 310,
+    EXPOSE_UNTIL = 460,
     PWM_1 = 6 << 4 | 1 << 3,
     TIMER_ON = 1 << 0,
     UPDATE = 1 << 0,
@@ -187,7 +192,7 @@ static void begin_triggers(void) {
     TIM4_CR1 = TIMER_ON;
 }
 
-const char *camera_start(capture *into, bool pattern) {
+const char *camera_start(capture *into, bool pattern, uint16_t exposure_rows) {
     camera_stop();
     if (capture_strip_words(into) > MOST_STRIP_WORDS) {
         return "strips are longer than their memory";
@@ -197,10 +202,10 @@ const char *camera_start(capture *into, bool pattern) {
     stm32h7_cameras_reset(false);
     clock_wait_ms(1);
     stm32h7_i2c_start();
-    if (!mt9v034_start(LEFT, pattern, stm32h7_i2c_write, stm32h7_i2c_read)) {
+    if (!mt9v034_start(LEFT, pattern, exposure_rows, stm32h7_i2c_write, stm32h7_i2c_read)) {
         return "no MT9V034 answers as the left camera (0x5C on I2C1)";
     }
-    if (!mt9v034_start(RIGHT, pattern, stm32h7_i2c_write, stm32h7_i2c_read)) {
+    if (!mt9v034_start(RIGHT, pattern, exposure_rows, stm32h7_i2c_write, stm32h7_i2c_read)) {
         return "no MT9V034 answers as the right camera (0x48 on I2C1)";
     }
     DMAMUX1_CR(CAMERA_STREAM) = DMA_REQUEST_DCMI;
@@ -217,7 +222,12 @@ void camera_stop(void) {
     (void)stream_stops();
 }
 
-void camera_expose(uint16_t rows) {
-    (void)(mt9v034_expose(LEFT, rows, stm32h7_i2c_write) &&
-           mt9v034_expose(RIGHT, rows, stm32h7_i2c_write));
+bool camera_rests(void) {
+    const uint32_t since_trigger = TIM4_CNT;
+    return since_trigger >= REST_BEGINS && since_trigger < EXPOSE_UNTIL;
+}
+
+bool camera_expose(uint16_t rows) {
+    return mt9v034_expose(LEFT, rows, stm32h7_i2c_write) &&
+           mt9v034_expose(RIGHT, rows, stm32h7_i2c_write) && TIM4_CNT >= REST_BEGINS;
 }
