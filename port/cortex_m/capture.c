@@ -3,6 +3,8 @@
 
 #include <stddef.h>
 
+#include "barrier.h"
+
 static void give_up(capture *c) {
     c->filling->state = CAPTURE_FREE;
     c->filling = NULL;
@@ -17,6 +19,7 @@ bool capture_begin(capture *c) {
         if (c->pairs[i].state == CAPTURE_FREE) {
             c->filling = &c->pairs[i];
             c->filling->state = CAPTURE_FILLING;
+            compiler_barrier(); /* its pixels are written from now on */
             c->strip = 0;
             c->stamped = c->late = false;
             return true;
@@ -65,6 +68,7 @@ void capture_strip(capture *c, const volatile uint32_t *strip, unsigned (*writte
         give_up(c);
         return;
     }
+    compiler_barrier();
     c->filling->state = CAPTURE_FULL; /* the last write: from now on it is the loop's */
     c->filling = NULL;
     ++c->done;
@@ -72,6 +76,7 @@ void capture_strip(capture *c, const volatile uint32_t *strip, unsigned (*writte
 
 const capture_pair *capture_take(capture *c) {
     capture_pair *full = NULL;
+    compiler_barrier(); /* the caller has read the one that it gives back */
     for (unsigned i = 0; i < 2; ++i) {
         if (c->pairs[i].state == CAPTURE_HELD) {
             c->pairs[i].state = CAPTURE_FREE;
@@ -83,5 +88,6 @@ const capture_pair *capture_take(capture *c) {
     if (full != NULL) {
         full->state = CAPTURE_HELD;
     }
+    compiler_barrier(); /* its pixels are read from now on */
     return full;
 }

@@ -6,6 +6,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "barrier.h"
+
 /* A power of two; 0.64 s at 200 Hz: a cut link may hold the loop for half a second. */
 enum { READINGS = 128 };
 
@@ -26,16 +28,24 @@ static inline void readings_put(readings *r, const reading *one) {
         ++r->lost;
         return;
     }
+    compiler_barrier(); /* the loop has read what was there */
     r->ring[r->put % READINGS] = *one;
+    compiler_barrier();
     ++r->put;
 }
 
 /* Loop: the oldest reading, if it is not later than that. */
 static inline bool readings_take(readings *r, uint64_t until_ns, reading *one) {
-    if (r->put == r->taken || r->ring[r->taken % READINGS].t_ns > until_ns) {
+    if (r->put == r->taken) {
         return false;
     }
-    *one = r->ring[r->taken % READINGS];
+    compiler_barrier();
+    const reading *oldest = &r->ring[r->taken % READINGS];
+    if (oldest->t_ns > until_ns) {
+        return false;
+    }
+    *one = *oldest;
+    compiler_barrier();
     ++r->taken;
     return true;
 }

@@ -5,6 +5,7 @@
  * both. TIM2 tells the time: channel 1 and 2 take the ends of the exposure, of the left one's LED_OUT; channel 4 the
  * IMU's line. Registers: RM0433, chapters 16 (DMA), 31 (DCMI), 39 (timers).
  */
+#include "../barrier.h"
 #include "../camera.h"
 #include "../clock.h"
 #include "../ticks.h"
@@ -80,7 +81,7 @@ enum {
 };
 
 static volatile uint32_t strips[CAPTURE_BANKS][MOST_STRIP_WORDS] DMA_MEMORY;
-static capture *pairs;
+static capture *volatile pairs; /* 0: the interrupts leave pictures alone */
 static uint64_t latest_ticks;
 
 /* --- time --- */
@@ -209,6 +210,7 @@ const char *camera_start(capture *into, bool pattern, uint16_t exposure_rows) {
         return "no MT9V034 answers as the right camera (0x48 on I2C1)";
     }
     DMAMUX1_CR(CAMERA_STREAM) = DMA_REQUEST_DCMI;
+    compiler_barrier(); /* what the caller has set in it */
     pairs = into;
     begin_triggers();
     return 0;
@@ -220,6 +222,7 @@ void camera_stop(void) {
     pairs = 0;
     DCMI_CR = DCMI_SETTINGS;
     (void)stream_stops();
+    compiler_barrier(); /* it is the caller's again */
 }
 
 bool camera_rests(void) {

@@ -4,6 +4,7 @@
  * timer that stamps the cameras too; the transfer begins in that interrupt and ends in the bus's own: 13 bytes fit
  * into the FIFO, so that nothing waits. Registers: data sheet DS-000347, bank 0; RM0433, section 50.11.
  */
+#include "../barrier.h"
 #include "../camera.h"
 #include "../clock.h"
 #include "stm32h7.h"
@@ -47,7 +48,7 @@ enum {
 
 const double imu_accel_unit = 9.80665 / 2048, imu_gyro_unit = 3.14159265358979323846 / 180 / 16.4;
 
-static readings *queue;
+static readings *volatile queue; /* 0: the interrupts leave readings alone */
 static bool busy;
 static uint64_t ready_ns;
 
@@ -87,6 +88,7 @@ static bool sets(uint8_t where, uint8_t value) {
 const char *imu_start(readings *into) {
     uint8_t who = 0;
     queue = 0;
+    compiler_barrier();
     SPI1_IER = 0;
     SPI1_CR1 = CR1_SSI;
     SPI1_CFG1 = CFG1_8_BITS;
@@ -102,6 +104,7 @@ const char *imu_start(readings *into) {
     clock_wait_ms(50); /* the gyro's start */
     good = good && sets(INT_SOURCE0, 8);
     busy = false;
+    compiler_barrier();
     queue = good ? into : 0;
     SPI1_IER = SR_ENDED;
     return good ? 0 : "the IMU stopped to answer (SPI1)";
