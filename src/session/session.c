@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "pelorus/session.h"
 
+#include <float.h>
 #include <string.h>
 
+#include "math/finite.h"
 #include "pelorus/assertions.h"
 #include "record/messages.h"
 #include "session/events.h"
@@ -238,9 +240,13 @@ plr_status plr_session_look(plr_session *s, const plr_picture_pair *pair) {
     return enter(s, PLR_KIND_IMAGE) == USE ? plr_look_at(s, pair) : PLR_E_NOT_READY;
 }
 
-/* As a message's float32. Through memory: gcc 12.2 at -O3 with AVX2 leaves the rounding out where several stand side
- * by side. */
+/* As a message's float32. What float32 cannot hold becomes the most that it can, which is refused as implausible: C
+ * leaves that conversion undefined. Through memory: gcc 12.2 at -O3 with AVX2 leaves the rounding out where several
+ * stand side by side. */
 static double narrow(double wide) {
+    static const double most = (double)FLT_MAX;
+    if (plr_all_finite(&wide, 1) && (wide > most || wide < -most))
+        return wide > 0 ? most : -most;
     const volatile float rounded = (float)wide;
     return (double)rounded;
 }

@@ -72,6 +72,40 @@ static void test_readings_of_the_programs_own_imu_are_refused_like_those_of_mess
     desk_assert_nothing_refused();
 }
 
+/* Each is refused as it is told, and beside it a drive gives the same bits as without. */
+static void test_readings_that_no_float32_holds_are_refused_and_change_nothing(void) {
+    static const struct {
+        double value;
+        plr_status status;
+    } bad[] = {{1e39, PLR_E_RANGE},    {-1e39, PLR_E_RANGE},         {3.41e38, PLR_E_RANGE},
+               {-1e308, PLR_E_RANGE},  {HUGE_VAL, PLR_E_NOT_FINITE}, {-HUGE_VAL, PLR_E_NOT_FINITE},
+               {NAN, PLR_E_NOT_FINITE}};
+    const inertial_result alone = inertial_result_of(&inertial_plain);
+    desk_clear(1);
+    desk_begin();
+    desk_send(inertial_header());
+    desk_send(drive_start(0));
+    desk_run();
+    for (int k = 0; k < INERTIAL_FRAMES; k++) {
+        const plr_message last = drive_imu(INERTIAL_READING_S * INERTIAL_PER_FRAME * k, 1, 0);
+        for (int n = k == 0 ? 0 : INERTIAL_PER_FRAME * (k - 1) + 1; n <= INERTIAL_PER_FRAME * k;
+             n++)
+            TEST_ASSERT_EQUAL(PLR_OK, give(n));
+        for (unsigned i = 0; i < 6; i++) {
+            plr_imu one = last.as.imu.readings[0];
+            double *numbers[] = {one.a_B_mps2, one.w_B_radps};
+            numbers[i / 3][i % 3] = bad[(unsigned)k % 7].value;
+            TEST_ASSERT_EQUAL(PLR_OK, plr_session_inertial(&session, last.as.imu.t_ns + 1, &one));
+            TEST_ASSERT_EQUAL(bad[(unsigned)k % 7].status, session.imu_status);
+            TEST_ASSERT_EQUAL_UINT32(6 * (unsigned)k + i + 1, session.totals.imu_refused);
+        }
+        inertial_send_frame(&inertial_plain, k);
+        desk_run();
+    }
+    const inertial_result beside = inertial_read();
+    inertial_assert_same(&alone, &beside);
+}
+
 static void test_an_estimate_follows_each_reading_where_it_is_asked_for(void) {
     const inertial_manner batches = {.batch = INERTIAL_PER_FRAME};
     options.output |= PLR_OUTPUT_TWIST_POSE;
