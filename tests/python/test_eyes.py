@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -166,19 +167,41 @@ def test_a_copy_of_a_tracker_goes_on_by_itself() -> None:
     assert other.track(3, *pair(4)).report.followed > tracker.track(3, *pair(4)).report.followed
 
 
-def test_a_motion_that_is_told_wrong_costs_few_points_and_a_right_one_is_used() -> None:
-    def again(motion: Motion | None) -> int:
-        eyes = Eyes(PLAIN, (WIDTH, HEIGHT), corners=30)
-        found = [eyes.search(50_000_000 * k, *pair(2 * k), motion) for k in range(4)]
-        return sum(len(np.intersect1d(a.ids, b.ids)) for a, b in pairwise(found))
+def followed(shifts: Sequence[int], motions: Sequence[Motion | None]) -> int:
+    """Returns how many points are found again where they went, from pair to pair, of a wall that is
+    shown from so far on.
+    """
+    eyes, count = Eyes(PLAIN, (WIDTH, HEIGHT), corners=30), 0
+    found = [
+        eyes.search(50_000_000 * k, *pair(shift), motion)
+        for k, (shift, motion) in enumerate(zip(shifts, motions, strict=True))
+    ]
+    for (a, b), way in zip(pairwise(found), np.diff(shifts), strict=True):
+        _, before, after = np.intersect1d(a.ids, b.ids, return_indices=True)
+        went = b.pixels[after, 0] - a.pixels[before, 0]
+        count += int((np.abs(went + way) < 0.5).sum())
+    return count
 
+
+def aside(shift: int) -> Motion:
+    """Returns how the wall moves by the camera when that shows it from so many pixels further on."""
+    return np.eye(3), np.array([-shift * CAMERA.baseline_m / DISPARITY, 0, 0])
+
+
+def test_a_motion_that_is_told_wrong_costs_few_points() -> None:
+    shifts = [0, 2, 4, 6]
     turn = Rotation.from_rotvec([0, 0.4, 0]).as_matrix()
-    alone, right, wrong = (
-        again(one) for one in (None, (np.eye(3), np.array([-0.0286, 0, 0])), (turn, np.ones(3)))
-    )
+    alone = followed(shifts, [None] * 4)
     assert alone > 45
-    assert right > 45
-    assert wrong >= 0.8 * alone
+    assert followed(shifts, [aside(2)] * 4) > 45
+    assert followed(shifts, [(turn, np.ones(3))] * 4) >= 0.8 * alone
+
+
+def test_a_right_motion_finds_points_that_go_farther_than_they_are_searched_for() -> None:
+    shifts = [40, 0, 40, 0]  # neither near the last place nor where they were going
+    right = [aside(0), aside(-40), aside(40), aside(-40)]
+    assert followed(shifts, [None] * 4) < 10
+    assert followed(shifts, right) > 30
 
 
 def test_a_velocity_is_three_and_three_numbers() -> None:
