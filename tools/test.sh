@@ -216,7 +216,7 @@ ensure_python # there by now; if not, it says why and ends this
 beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
     tools/pelorus tools/course/pelorus_course tools/firmware tools/*.py port/ros2/pelorus_ros/pelorus_ros/[!n]*.py tests/python tests/layering tests/golden tests/fuzz tests/independent \
     tests/recordings examples/*.py
-beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
+beside 'Python types, tests on boards' env MYPYPATH=tools:tests/python "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
 beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests port examples
 beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests port examples

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import own_tree
 import pytest
 from converted import Converted, Once
 from flight_logs import Compare, robots_log
@@ -26,6 +27,10 @@ from replay_drive import BIN, Record, drive, encode, recorder
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "port" / "ros2" / "pelorus_ros"))  # what of the node needs no ROS
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    own_tree.require(config)
 
 
 HANG_S = 1800.0  # nothing is awaited by the clock: only what hangs is ended

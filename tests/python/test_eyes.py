@@ -184,7 +184,7 @@ def followed(shifts: Sequence[int], motions: Sequence[Motion | None]) -> int:
 
 
 def aside(shift: int) -> Motion:
-    """Returns how the wall moves by the camera when that shows it from so many pixels further on."""
+    """Returns how the wall passes a camera that shows it from so many pixels further on."""
     return np.eye(3), np.array([-shift * CAMERA.baseline_m / DISPARITY, 0, 0])
 
 

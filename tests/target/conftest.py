@@ -21,8 +21,9 @@ from pelorus.robot.link import Link
 from pelorus.wire.frames import Kind, Message
 from pelorus.wire.framing import read_file
 
-# For firmware.stack, which is no part of the package.
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
+ROOT = Path(__file__).resolve().parents[2]
+# For firmware.stack, which is no part of the package, and own_tree.
+sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tests/python")]
 
 LONGEST = ("test_bits", "test_new_board")
 HANG_S = 1800.0  # nothing is awaited by the clock: only what hangs is ended
@@ -38,6 +39,9 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    import own_tree  # noqa: PLC0415
+
+    own_tree.require(config)
     config.addinivalue_line("markers", "once: about the host; one board is enough")
     config.addinivalue_line("markers", "boards(*names): for these boards alone")
     config.addinivalue_line(
