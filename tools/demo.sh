@@ -27,7 +27,7 @@ ensure_python
 
 heading 'Building (build/)'
 mkdir -p "$LOGS"
-if ! build_preset release -DPELORUS_BUILD_TESTS=OFF >"$LOGS/demo-build.log" 2>&1; then
+if ! build_desktop >"$LOGS/demo-build.log" 2>&1; then
     tail -40 "$LOGS/demo-build.log"
     die "the build failed: the whole of it is in $LOGS/demo-build.log"
 fi

@@ -43,8 +43,7 @@ ensure_python
 heading "Building: firmware for $board, and this machine's replay"
 mkdir -p "$LOGS" "$ROOT/out"
 build() {
-    build_preset release -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=OFF &&
-        build_robot "$image"
+    build_desktop && build_robot "$image"
 }
 if ! build >"$LOGS/robot-demo-build.log" 2>&1; then
     tail -40 "$LOGS/robot-demo-build.log"

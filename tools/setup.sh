@@ -143,6 +143,18 @@ build_preset() {
         cmake --build --preset "$preset" -j "$JOBS")
 }
 
+# build_desktop: what the tools need of build/. A folder that was configured with tests keeps them, and its other
+# options: ctest would run old programs there otherwise.
+build_desktop() {
+    local options=()
+    grep -qs '^PELORUS_BUILD_TESTS:BOOL=ON' "$ROOT/build/CMakeCache.txt" ||
+        options=(-DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=OFF)
+    (cd "$ROOT" &&
+        cmake --preset release -DPython3_EXECUTABLE="$VENV/bin/python" "${options[@]+"${options[@]}"}" &&
+        cmake --build --preset release -j "$JOBS" \
+            --target pelorus-replay pelorus-replay-f64 pelorus-filter pelorus-filter-f64)
+}
+
 # build_replays NAME [CMAKE OPTION...]: of a preset pelorus-replay and pelorus-replay-f64 alone.
 build_replays() {
     local preset=$1
