@@ -2,18 +2,20 @@
 # SPDX-License-Identifier: MIT
 # Makes all files of a release in build/release, with SHA256SUMS: wheels for five systems, the
 # source distribution, the two files of tools/amalgamate.py, and the firmware of the demo for every
-# board. It publishes nothing.
+# board, with FIRMWARE.txt; a board that nobody has tried has `untried` in its files' names. It
+# publishes nothing.
 #
 # usage: tools/release.sh
 #
 # SYSTEMS='win_amd64' or BOARDS='stm32f405' in the environment: these wheels and boards alone.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+. "$ROOT/tools/firmware/files.sh"
 
 case ${1-} in
 '') ;;
 *)
-    sed -n '3,9s/^# \{0,1\}//p' "$0"
+    sed -n '3,10s/^# \{0,1\}//p' "$0"
     exit 0
     ;;
 esac
@@ -48,11 +50,7 @@ if ! build_robot "${images[@]}" >"$LOGS/release-build.log" 2>&1; then
     tail -40 "$LOGS/release-build.log"
     die "the build failed: the whole of it is in $LOGS/release-build.log"
 fi
-for image in "${images[@]}"; do
-    for end in elf bin hex; do
-        cp "$ROBOT/images/$image.$end" "$out/${image/pelorus-/pelorus-$version-}.$end"
-    done
-done
+copy_images "$out" "$version" $boards
 
 heading 'Done'
 cd "$out"

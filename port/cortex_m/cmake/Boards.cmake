@@ -48,3 +48,6 @@ set(board_stm32h743_eyes 90240 50 64)
 
 #   board_<name>_sensors: cameras and IMU of its images with eyes, in the place of pictures that come over the link
 set(board_stm32h743_sensors sensors_stereo.c)
+
+#   board_<name>_untried: it has run neither on hardware nor in an emulator; its files of a release say so
+set(board_stm32h743_untried TRUE)
