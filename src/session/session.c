@@ -241,8 +241,8 @@ plr_status plr_session_look(plr_session *s, const plr_picture_pair *pair) {
 }
 
 /* As a message's float32. What float32 cannot hold becomes the most that it can, which is refused as implausible: C
- * leaves that conversion undefined. Through memory: gcc 12.2 at -O3 with AVX2 leaves the rounding out where several
- * stand side by side. */
+ * leaves that conversion undefined. Through memory: gcc 12.2 leaves the rounding out where several stand side by
+ * side (docs/NUMERICS.md 7). */
 static double narrow(double wide) {
     static const double most = (double)FLT_MAX;
     if (plr_all_finite(&wide, 1) && (wide > most || wide < -most))
