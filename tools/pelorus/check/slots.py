@@ -2,9 +2,9 @@
 """How few slots suffice for a recording's landmarks: time grows with the square of their number.
 
 The landmark unseen for longest is evicted first. One that is never seen again says nothing about
-the others, but its rows of P cost as much as theirs. Without it a filter finds the same, up to the
-order in which a frame's points are used: costs an observation differ by 3e-4, and by 5e-3 with
-settings that are far off.
+the others, but its rows of P cost as much as theirs. Without it model world finds the same, bit by
+bit; body takes part of its linearisation from all landmarks (docs/TESTING.md), and costs an
+observation differ by 4e-4 to 5e-3.
 """
 
 from __future__ import annotations
