@@ -35,13 +35,12 @@ static inline int16x8_t plr_gather_eight(const uint8_t *p, uint16x8_t offset) {
 
 /* --- cutting --- */
 
-static inline void plr_sample_eight(const uint8_t *p, uint32_t stride, int16_t wx, int16x8_t wy,
+static inline void plr_sample_eight(const uint8_t *p, uint32_t stride, int16x8_t wx, int16x8_t wy,
                                     uint8_t *to) {
     const int16x8_t a = plr_load_eight(p), b = plr_load_eight(p + 1),
                     c = plr_load_eight(p + stride), d = plr_load_eight(p + stride + 1);
-    const int16x8_t top = vmlaq_n_s16(vmulq_n_s16(vsubq_s16(b, a), wx), a, 64);
-    const int16x8_t low = vmlaq_n_s16(vmulq_n_s16(vsubq_s16(d, c), wx), c, 64);
-    const int16x8_t grey = vrshrq_n_s16(plr_between(top, low, wy), 4);
+    const int16x8_t grey =
+        vrshrq_n_s16(plr_between(plr_along(a, b, wx), plr_along(c, d, wx), wy), 4);
     vstrbq_u16(to, vreinterpretq_u16_s16(grey));
 }
 
@@ -50,7 +49,7 @@ void plr_patch_sample(const plr_image *image, int32_t x, int32_t y,
                       uint8_t patch[PLR_PATCH_BYTES]) {
     const uint8_t *p =
         image->pixels + (uint32_t)(y >> PLR_FRACTION) * image->stride + (x >> PLR_FRACTION);
-    const int16_t wx = (int16_t)(x >> (PLR_FRACTION - PLR_WEIGHT) & 63);
+    const int16x8_t wx = vdupq_n_s16((int16_t)(x >> (PLR_FRACTION - PLR_WEIGHT) & 63));
     const int16x8_t wy = vdupq_n_s16((int16_t)(y >> (PLR_FRACTION - PLR_WEIGHT) & 63));
     for (int j = 0; j < PLR_PATCH_KEPT; j++, p += image->stride, patch += PLR_PATCH_KEPT) {
         plr_sample_eight(p, image->stride, wx, wy, patch);
