@@ -349,8 +349,8 @@ exactly 20 observations in each frame, then with up to {busy}; in one image with
 10 ms, in the other with a reading of an IMU every 5 ms.
 
 A frame of these drives costs at most what stands below its table, in instructions, with m
-observations in the frame, n rows of the state (12 + 3 N with twists, 15 + 3 N with an IMU), and b
-= min(m, N) / 8 blocks, rounded up. The coefficients are fitted to the worst frames of all boards
+observations in the frame, n rows of the state (12 + 3 N with twists, 15 + 3 N with an IMU), and
+b = min(m, N) / 8 blocks, rounded up. The coefficients are fitted to the worst frames of all boards
 and scaled until none is above; *its bound* is the formula at m = {busy}, beside the busiest frame
 that was met. Every loop has a count that N and m bound, and a library function that is not of
 constant time for such a count does not exist in it; so there is a worst case. It is above the
