@@ -31,7 +31,7 @@ def here() -> dict[str, str]:
 def started(python: str = sys.executable) -> dict[str, str]:
     """Returns the same for the programs that tests start, which see another sys.path."""
     command = [python, "-c", FIND, *PACKAGES]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT.anchor)
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     return dict(zip(PACKAGES, done.stdout.split("\n"), strict=False))
 
 
