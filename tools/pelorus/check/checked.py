@@ -90,7 +90,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
         return Checked(verdict_of(None, known), None, [], [], [], [], None)
     step("noises, clock and biases")
     one_clock = all(fault.name != "clock-turns" for fault in known.faults)
-    found = tune(bench, without_clock(given), one_clock)
+    found = tune(bench, without_clock(given), known.judged.agreed, one_clock)
     if "calibrate" in given:
         found = replace(found, settings=found.settings | {"calibrate": given["calibrate"]})
     if any(fault.lasts for fault in known.faults):

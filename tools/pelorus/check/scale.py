@@ -2,9 +2,7 @@
 """Tells whether the twists' velocities have another scale than the images.
 
 A wrong baseline, focal length or wheel radius makes a constant error of percents, neither noise nor
-a clock. The velocities are multiplied by factors about 1; a parabola through the likelihoods gives
-the best one and how well the parts of the drive agree on it. Biases stay free: at constant speed a
-bias and a scale look the same, and the scale stays unknown.
+a clock. At constant speed a bias and a scale look the same, and the scale stays unknown.
 """
 
 from __future__ import annotations
@@ -14,37 +12,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pelorus.check import clock
 from pelorus.check.lasting import ADDS, added_nees, stands
-from pelorus.check.options import Settings
-from pelorus.check.outcome import SCALE, Bench
-from pelorus.check.parameters import PAYS
 from pelorus.faults.agreement import Agreement
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import Message
 from pelorus.wire.layout import Floats
 from pelorus.wire.settings import in_force
 
-STEP, STEPS = 0.01, 4
 SURE = 4.0  # sigmas from which a scale is off
 BY_BIAS = 1.5  # ratio of sigmas with and without biases, above which the biases hide the scale
 BASELINE_MOST = 0.1  # largest baseline-sigma that the setting takes
-BESIDE = 2  # steps to either side of the best one, through which a parabola is laid
 
 
-def off_by(bench: Bench, settings: Settings) -> float:
-    """Returns the best factor minus 1; 0 where the factor may be 1."""
-    for reach in (BESIDE, STEPS):  # the outer steps only where the best one is not in the middle
-        factors = 1 + STEP * np.arange(-reach, reach + 1)
-        ran = bench.run_all([{**settings, SCALE: f"{at:.3f}"} for at in factors], "scale")
-        most = max(outcome.matched for outcome in ran)
-        costs = np.stack([clock.of_parts(outcome, most) for outcome in ran])
-        best = factors[np.argmin(costs.sum(axis=1))]
-        near = np.abs(factors - best) < (BESIDE + 0.5) * STEP
-        if near.all():
-            break
-    foot = clock.foot(factors[near] - 1, costs[near])
-    return foot.best_s if foot.gain > PAYS else 0.0
+def off_by(agreed: Agreement | None) -> float:
+    """Returns how much longer the images' way is than the twists', as a share; 0 if it may be 0."""
+    if agreed is None or not agreed.is_known:
+        return 0.0
+    off = agreed.scale - 1
+    return off if abs(off) > SURE * agreed.scale_sigma else 0.0
 
 
 def words(off: float) -> str:
