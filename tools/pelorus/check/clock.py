@@ -66,6 +66,11 @@ def of_fit(agreed: Agreement | None) -> Offset:
     return Offset(agreed.offset_s, agreed.offset_sigma_s)
 
 
+def surer(one: Offset, other: Offset) -> Offset:
+    """Returns that of two estimates which is known better; `other` where both are alike."""
+    return one if one.sigma_s < other.sigma_s else other
+
+
 def of_twists(bench: Bench, settings: Settings, about_s: float | None = None) -> Offset:
     """Estimates the offset by twists in steps of whole readings; unknown with one reading a frame.
 

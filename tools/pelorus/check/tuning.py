@@ -40,9 +40,7 @@ ALIKE = "one sigma for all axes"
 OF_AXES = (2.0, 1.5)  # factors from one sigma for all axes to one for each
 
 
-def tune(
-    bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bool = True
-) -> Tuned:
+def tune(bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bool = True) -> Tuned:
     """Finds the settings of a recording.
 
     `given` holds wherever nothing better is found. `agreed` is how far camera and body agree, if

@@ -60,7 +60,8 @@ def tune(bench: Bench, given: Settings, of_fit: clock.Offset) -> Tuned:
     values, offset = _roughly(bench, side, values, of_fit)
     side[OFFSET] = f"{offset.best_s:.6f}"
     values = search_noises(bench, side | slots.fewer(given), values, IMU, MIDDLE).values
-    offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s, clock.NEAR_STEPS)
+    ran = clock.of_imu(bench, side | written(values, IMU), offset.best_s, clock.NEAR_STEPS)
+    offset = clock.surer(of_fit, ran)
     side, words = _clock(side | written(values, IMU), offset, given)
     said.append(words)
     side, words = _walks(bench, side, walks)
@@ -257,7 +258,7 @@ def _of_drifting_tracks(
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     settings = {**side, **noise.setting(side), **written(values, PIXEL | IMU | WALKS)}
     near = (of_fit.best_s, clock.NEAR_STEPS) if of_fit.is_near else (float(side[OFFSET]),)
-    offset = clock.of_imu(bench, settings | slots.fewer(settings), *near)
+    offset = clock.surer(of_fit, clock.of_imu(bench, settings | slots.fewer(settings), *near))
     settings, words = _clock(settings, offset, {"camera-offset": side[OFFSET]})
     outcome = bench.run(settings)
     offset_s = float(settings.pop(OFFSET))
