@@ -15,7 +15,7 @@ from converted import Run
 from draws import draws, long_run
 from everyday import drawn
 from everyday import drive as everyday_drive
-from pelorus.check import clock, scale, search, tuning, verdict
+from pelorus.check import calibration, clock, search, tuning, verdict
 from pelorus.check.contents import scaled
 from pelorus.check.known import known_of
 from pelorus.check.options import Settings
@@ -51,7 +51,9 @@ def test_a_baseline_that_is_off_is_told_and_a_bias_of_the_velocity_is_none(
     tmp_path: Path, options: tuple[str, ...], off: float
 ) -> None:
     known = known_of(framing.messages_of(simulated(tmp_path, *options)))
-    assert scale.off_by(known.judged.agreed) == pytest.approx(off, abs=0.015 if off else 0)
+    assert calibration.scale_off_by(known.judged.agreed) == pytest.approx(
+        off, abs=0.015 if off else 0
+    )
 
 
 def test_what_a_scale_explains_is_no_clock(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -215,7 +217,7 @@ def test_a_verdict_is_no_better_than_what_the_drive_tells_of_the_scale(
 
 def test_what_a_drive_does_not_tell_is_no_figure_of_the_camera() -> None:
     """Six seconds of a circle at an even speed: positions were off "by 81 % of the way"."""
-    doubt = scale.Doubt(0.9, 0.3, 0.05, 0.2, adds=100.0)
+    doubt = calibration.Doubt(0.9, 0.3, 0.05, 0.2, adds=100.0)
     assert not doubt.setting
     assert doubt.beyond == 0
     (remark,) = verdict.of_scale(doubt)

@@ -10,13 +10,12 @@ from pelorus.check import changes
 from pelorus.check.calibration import calibration
 from pelorus.check.covering import CALIBRATE, covering
 from pelorus.check.estimated import without_clock
-from pelorus.check.halves_alike import with_halves_alike
+from pelorus.check.halves_alike import with_halves_alike, with_shared_rows
 from pelorus.check.held import held_against
 from pelorus.check.known import Known
 from pelorus.check.options import Settings, options_of
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
-from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
 from pelorus.check.verdict import Grade, JudgedRun, Remark, Verdict, of_search, verdict_of
 from pelorus.errors import PelorusError

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pelorus.check import clock, scale, slots, tuning_imu
+from pelorus.check import calibration, clock, slots, tuning_imu
 from pelorus.check.biases import WIDE, biases_by_halves, gyro_bias_in_drift
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, SCALE, Bench
@@ -79,7 +79,7 @@ def _tune(bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bo
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
     fixed, of_bias = biases_by_halves(bench, moved, values)
-    off = scale.off_by(agreed)
+    off = calibration.scale_off_by(agreed)
     if one_clock:
         about_s = offset.best_s if np.isfinite(offset.sigma_s) else None
         fixed, found, of_clock = clocked(bench, fixed, values, given, off, about_s)
@@ -89,7 +89,7 @@ def _tune(bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bo
     offset_s = float(fixed.pop(OFFSET))
     settings = merged(fixed | written(found.values, TWIST)) | offset_settings(offset_s)
     said = [of_bias, of_clock, of_axes]
-    lasting = [scale.words(off)] if off else []
+    lasting = [calibration.scale_words(off)] if off else []
     outcome = found.outcome
     return Tuned(settings, before, outcome, noise, said, offset_s, [of_clock], lasting=lasting)
 
