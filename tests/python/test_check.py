@@ -112,7 +112,7 @@ def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) 
     offset = clock.of_twists(bench, true)
     assert offset.best_s == pytest.approx(-0.05, abs=max(0.01, 3 * offset.sigma_s))
     assert offset.sigma_s < 0.01
-    assert offset.gain > PAYS
+    assert offset.gain_over(0.0) > PAYS
 
 
 def test_the_timing_of_the_readings_is_found(simulated: Path, tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_the_foot_of_a_parabola_and_how_sure_it_is() -> None:
     offset = clock.foot(at, 7.0 + ((at - 0.004) / 0.002) ** 2)
     assert offset.best_s == pytest.approx(0.004)
     assert offset.sigma_s == pytest.approx(0.002)
-    assert offset.gain == pytest.approx(4.0)
+    assert offset.gain_over(0.0) == pytest.approx(4.0)
     jumping = clock.foot(at, ((at - 0.004) / 0.002) ** 2 + 40 * np.array([0, 1, 0, 1, 0, 1, 0]))
     assert jumping.sigma_s > offset.sigma_s  # a parabola that does not fit is not believed
     assert clock.foot(at, -(at**2)).sigma_s == np.inf
@@ -251,7 +251,7 @@ def test_the_foot_of_a_parabola_and_how_sure_it_is() -> None:
     assert apart.best_s == pytest.approx(0, abs=1e-9)
     assert apart.sigma_s == pytest.approx(0.02 / np.sqrt(19), rel=0.05)
     assert clock.foot(at, parts.sum(axis=1)).sigma_s < 0.001
-    assert clock.foot(at[:2], at[:2]).gain == 0
+    assert clock.foot(at[:2], at[:2]).gain_over(0.0) == 0
 
 
 # --- what the likelihood is made of ---------------------------------------------------------------

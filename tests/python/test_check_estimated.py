@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from converted import Once
 from pelorus.check import verdict
-from pelorus.check.calibration import CalibrationDoubts
+from pelorus.check.calibration import CalibrationDoubts, Turned
 from pelorus.check.estimated import Estimated, estimated, without_clock
-from pelorus.check.mount import Turned
 from pelorus.check.verdict import Grade
 from pelorus.commands.cli import main
 from pelorus.native.replay import replayed

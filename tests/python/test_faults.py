@@ -15,8 +15,8 @@ from drives import (
     with_stale_tracks,
     with_turned_axes,
 )
-from pelorus.faults import axes, lever, stale
-from pelorus.faults.mend import held_to_fit, mend
+from pelorus.faults import stale
+from pelorus.faults.mend import mend
 from pelorus.io.recording import Recording
 from pelorus.math.axes import FORWARD_LEFT_UP_IN_CAMERA, body_axes, name, turns
 from pelorus.wire.frames import BodyAxes, TwistTiming
@@ -48,26 +48,26 @@ def same_extrinsic(one: Recording, other: Recording) -> bool:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_clean_drive_is_left_alone(seed: int, changes: dict[str, float]) -> None:
     recording = clean(seed, **changes)
-    mended, findings = mend(recording)
-    assert [finding.found for finding in findings] == [False, False, False], findings
-    assert mended is recording
+    mended = mend(recording)
+    assert not any(finding.found for finding in (*mended.changes, *mended.told)), mended
+    assert mended.recording is recording
 
 
 def test_a_camera_at_rest_may_repeat_its_pixels() -> None:
     recording = at_rest()
-    mended, findings = mend(recording)
-    assert not any(finding.found for finding in findings), findings
-    assert mended is recording
+    mended = mend(recording)
+    assert not any(finding.found for finding in mended.changes), mended.changes
+    assert mended.recording is recording
 
 
 def test_pictures_that_stand_still_are_no_stale_tracks() -> None:
     resting = at_rest()
     frozen = replace(resting, v_B_mps=resting.v_B_mps + np.array([1.0, 0, 0]))
-    split, findings = mend(frozen)
+    split, _ = stale.mend(frozen)
     assert split.tracks is not frozen.tracks
-    mended, findings = held_to_fit(frozen, split, findings)
-    assert mended.tracks is frozen.tracks
-    told = {finding.subject: finding for finding in findings}
+    mended = mend(frozen)
+    assert mended.recording.tracks is frozen.tracks
+    told = {finding.subject: finding for finding in (*mended.changes, *mended.told)}
     assert told["stale tracks"].action.startswith("left as given")
     assert "frozen" in told
     assert told["frozen"].found
@@ -108,17 +108,19 @@ def test_a_track_that_repeats_alone_is_no_stale_frame() -> None:
 @pytest.mark.parametrize("F", turns()[1::5], ids=str)
 def test_turned_axes_are_found_and_turned_back(seed: int, F: Floats) -> None:
     recording = clean(seed)
-    mended, finding = axes.mend(with_turned_axes(recording, F))
+    mended = mend(with_turned_axes(recording, F))
+    finding = mended.changes[-1]
     assert finding.found, finding
-    assert same_extrinsic(mended, recording)
+    assert finding.subject == "axes"
+    assert same_extrinsic(mended.recording, recording)
     assert "forward-left-up" in finding.action
 
 
 def test_turned_axes_are_found_under_a_gyro_bias_and_noise() -> None:
     recording = clean(4, bias_gyro_sigma_radps=0.02, gyro_sigma_radps=0.05, velocity_sigma_mps=0.5)
-    mended, finding = axes.mend(with_turned_axes(recording))
-    assert finding.found
-    assert same_extrinsic(mended, recording)
+    mended = mend(with_turned_axes(recording))
+    assert mended.changes[-1].found
+    assert same_extrinsic(mended.recording, recording)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -127,31 +129,44 @@ def test_a_cameras_position_as_translation_is_found_and_mended(
     seed: int, changes: dict[str, float]
 ) -> None:
     recording = clean(seed, **changes)
-    mended, finding = lever.mend(with_camera_position(recording))
+    mended = mend(with_camera_position(recording))
+    finding = mended.changes[-1]
     assert finding.found, finding
-    assert same_extrinsic(mended, recording)
+    assert finding.subject == "lever"
+    assert same_extrinsic(mended.recording, recording)
 
 
-def test_without_a_turn_the_lever_is_left_and_that_is_said() -> None:
-    recording = with_camera_position(clean(1, lap_s=1e9))
-    mended, finding = lever.mend(recording)
-    assert not finding.found
-    assert mended is recording
-    assert finding.action == "left as given"
-    assert not finding.is_conclusive
+def test_on_a_straight_way_its_sway_tells_the_lever_and_too_few_frames_do_not() -> None:
+    straight = clean(1, lap_s=1e9)
+    assert same_extrinsic(mend(with_camera_position(straight)).recording, straight)
+    short = with_camera_position(clean(1, lap_s=1e9, duration_s=4.0))
+    mended = mend(short)
+    assert mended.recording is short
+    assert not any(finding.found for finding in (*mended.changes, *mended.told))
+    assert not all(finding.is_conclusive for finding in mended.told)
 
 
 def test_all_faults_at_once_are_mended_in_turn() -> None:
     recording = clean(2)
     broken, repeated = with_stale_tracks(recording, STALE)
     broken = with_turned_axes(with_camera_position(broken))
-    mended, findings = mend(broken)
-    assert [finding.found for finding in findings] == [True, True, True], findings
-    assert same_extrinsic(mended, recording)
-    again, findings = mend(mended)
-    assert not any(finding.found for finding in findings), "a mended recording is clean"
-    assert again is mended
+    mended = mend(broken)
+    assert [finding.subject for finding in mended.changes] == ["stale tracks", "axes", "lever"]
+    assert all(finding.found for finding in mended.changes), mended.changes
+    assert same_extrinsic(mended.recording, recording)
+    again = mend(mended.recording)
+    assert not any(finding.found for finding in again.changes), "a mended recording is clean"
+    assert again.recording is mended.recording
     assert repeated > 0
+
+
+def test_an_extrinsic_that_does_not_fit_even_then_is_left_as_given_and_its_fault_named() -> None:
+    """Rates that are mirrored: no turn of the body explains them."""
+    recording = clean(3)
+    broken = replace(recording, w_B_radps=recording.w_B_radps * [1, 1, -1])
+    mended = mend(broken)
+    assert same_extrinsic(mended.recording, broken)
+    assert any(finding.found for finding in mended.told), mended.told
 
 
 @pytest.mark.parametrize("given", [TwistTiming.START, TwistTiming.END])

@@ -13,7 +13,7 @@ from converted import Run
 from imu_drives import NOISY, npz_arrays, options, written
 from injected import OF_IMU
 from pelorus.faults.imu_axes import Matrix
-from pelorus.faults.mend import held_to_fit
+from pelorus.faults.mend import findings_of
 from pelorus.faults.named import faults_in
 from pelorus.io.recording import Recording
 from pelorus.simulate import drive as way
@@ -109,7 +109,7 @@ def test_forces_that_are_no_motions_fit_nothing(drive: Recording) -> None:
 def test_the_converter_says_how_well_it_knows_that_a_clean_drive_has_no_faults(
     drive: Recording,
 ) -> None:
-    [known] = held_to_fit(drive, drive, [])[1]
+    [known] = findings_of(drive)
     assert not known.found
     assert re.search(
         r"scale of the way [\d.]+ \+- 0\.0\d+, clock [-+]\d+ \+- \d ms", known.evidence

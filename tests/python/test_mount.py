@@ -14,7 +14,7 @@ from draws import draws, long_run
 from everyday import drawn
 from everyday import drive as everyday_drive
 from pelorus.check import verdict
-from pelorus.check.mount import Turned
+from pelorus.check.calibration import Turned
 from pelorus.io.recording import Recording
 from pelorus.math import se3
 from replay_drive import BIN

@@ -8,9 +8,9 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pelorus.check.halves_alike import with_shared_rows
 from pelorus.check.outcome import NOTHING
 from pelorus.check.parameters import Tuned
-from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tracks_noise import TrackNoise
 from pelorus.io.tracks import Tracks
 from pelorus.tracking.row_gaps import row_gaps

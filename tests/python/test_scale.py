@@ -15,14 +15,14 @@ from converted import Run
 from draws import draws, long_run
 from everyday import drawn
 from everyday import drive as everyday_drive
-from pelorus.check import clock, scale, search, tuning, verdict
-from pelorus.check.biases import WIDE
+from pelorus.check import calibration, clock, search, tuning, verdict
 from pelorus.check.contents import scaled
+from pelorus.check.known import known_of
 from pelorus.check.options import Settings
-from pelorus.check.outcome import NOTHING, SCALE, Bench
+from pelorus.check.outcome import NOTHING, OFFSET, SCALE, Bench
+from pelorus.wire import framing
 from pelorus.wire.frames import Twist
 from replay_drive import BIN, drive, header
-from report_runs import built_programs
 
 TRUE = {"pixel-sigma": "0.5", "velocity-sigma": "0.05", "gyro-sigma": "0.005"}
 
@@ -50,8 +50,10 @@ def simulated(folder: Path, *options: str) -> Path:
 def test_a_baseline_that_is_off_is_told_and_a_bias_of_the_velocity_is_none(
     tmp_path: Path, options: tuple[str, ...], off: float
 ) -> None:
-    bench = Bench(built_programs().float32, simulated(tmp_path, *options), tmp_path)
-    assert scale.off_by(bench, TRUE | WIDE) == pytest.approx(off, abs=0.015 if off else 0)
+    known = known_of(framing.messages_of(simulated(tmp_path, *options)))
+    assert calibration.scale_off_by(known.judged.agreed) == pytest.approx(
+        off, abs=0.015 if off else 0
+    )
 
 
 def test_what_a_scale_explains_is_no_clock(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,28 +76,80 @@ def test_what_a_scale_explains_is_no_clock(monkeypatch: pytest.MonkeyPatch) -> N
     assert "no offset of the camera's clock is likelier than yours (known to 4 ms)" in words
 
 
-@pytest.mark.parametrize("one_clock", [True, False])
-def test_two_clocks_are_no_timing(monkeypatch: pytest.MonkeyPatch, one_clock: bool) -> None:
-    """Starry Night's gyro is late beside its velocities; `end` is likelier, and the worse."""
-    found = search.BestFound({"pixel": 0.5, "velocity": 0.1, "gyro": 0.01}, NOTHING)
-    monkeypatch.setattr(clock, "of_twists", lambda *_: clock.Offset(0.06, 0.001))
+FOUND = search.BestFound({"pixel": 0.5, "velocity": 0.1, "gyro": 0.01}, NOTHING)
+
+
+@pytest.fixture
+def still_bench(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Returns a bench for the twists' search, of which nothing but the clock is left."""
     monkeypatch.setattr(clock, "seconds", lambda _: 0.02)
-    monkeypatch.setattr(scale, "off_by", lambda *_: 0.0)
-    monkeypatch.setattr(tuning, "search_noises", lambda *_: found)
+    monkeypatch.setattr(tuning, "search_noises", lambda *_: FOUND)
     monkeypatch.setattr(tuning, "track_noise", lambda _: SimpleNamespace(drifts=False))
     monkeypatch.setattr(tuning, "difference_of_a_reading", lambda *_: None)
     monkeypatch.setattr(tuning, "biases_by_halves", lambda _, fixed, __: (fixed, "no bias"))
-    monkeypatch.setattr(tuning, "_axes", lambda *_: (found, "one sigma for all axes"))
-    bench = SimpleNamespace(
+    monkeypatch.setattr(tuning, "_axes", lambda *_: (FOUND, "one sigma for all axes"))
+    return SimpleNamespace(
         by_imu=False,
         header=header(),
         examined=SimpleNamespace(twist_t_ns=[]),
         run=lambda _: NOTHING,
     )
+
+
+@pytest.mark.parametrize("one_clock", [True, False])
+def test_two_clocks_are_no_timing(
+    monkeypatch: pytest.MonkeyPatch, still_bench: Any, one_clock: bool
+) -> None:
+    """Starry Night's gyro is late beside its velocities; `end` is likelier, and the worse."""
+    monkeypatch.setattr(clock, "of_twists", lambda *_: clock.Offset(0.06, 0.001))
     given = {"camera-offset": "0.01"}
-    tuned = tuning.tune(cast(Any, bench), given, one_clock)
+    tuned = tuning.tune(still_bench, given, None, one_clock)
     assert float(tuned.settings["camera-offset"]) == (0.06 if one_clock else 0.01)
     assert any("two clocks" in words for words in tuned.said) != one_clock
+
+
+@pytest.mark.parametrize(
+    ("fit_s", "sigma_s", "given_s", "begins"),
+    [
+        (0.06, 0.003, 0.0, 0.06),
+        (0.0, 0.003, 0.05, 0.0),  # a setting that is wrong
+        (0.01, 0.003, 0.0, 0.0),  # chance
+        (0.06, 0.02, 0.0, None),  # too rough: all offsets are tried
+        (float("nan"), float("inf"), 0.0, None),
+    ],
+    ids=["late", "given wrong", "chance", "rough", "untold"],
+)
+def test_the_search_for_the_clock_begins_where_the_fit_finds_it(
+    monkeypatch: pytest.MonkeyPatch,
+    still_bench: Any,
+    fit_s: float,
+    sigma_s: float,
+    given_s: float,
+    begins: float | None,
+) -> None:
+    asked: list[float | None] = []
+    rough: list[float] = []
+
+    def of_twists(_: Bench, _settings: Settings, about_s: float | None = None) -> clock.Offset:
+        asked.append(about_s)
+        return clock.Offset(0.06, 0.001)
+
+    def biases(_: Bench, fixed: Settings, __: Any) -> tuple[Settings, str]:
+        rough.append(float(fixed[OFFSET]))
+        return fixed, "no bias"
+
+    monkeypatch.setattr(clock, "of_twists", of_twists)
+    monkeypatch.setattr(tuning, "biases_by_halves", biases)
+    agreed = cast(
+        Any, SimpleNamespace(is_known=True, offset_s=fit_s, offset_sigma_s=sigma_s, scale=1.0,
+                             scale_sigma=0.01),
+    )  # fmt: skip
+    tuning.tune(still_bench, {"camera-offset": str(given_s)}, agreed)
+    if begins is None:
+        assert asked == [None, 0.06]  # the whole range, and then about the best
+    else:
+        assert asked == [fit_s]
+        assert rough == [begins]
 
 
 def test_velocities_of_another_scale_keep_their_noise_and_their_turns() -> None:
@@ -163,7 +217,7 @@ def test_a_verdict_is_no_better_than_what_the_drive_tells_of_the_scale(
 
 def test_what_a_drive_does_not_tell_is_no_figure_of_the_camera() -> None:
     """Six seconds of a circle at an even speed: positions were off "by 81 % of the way"."""
-    doubt = scale.Doubt(0.9, 0.3, 0.05, 0.2, adds=100.0)
+    doubt = calibration.Doubt(0.9, 0.3, 0.05, 0.2, adds=100.0)
     assert not doubt.setting
     assert doubt.beyond == 0
     (remark,) = verdict.of_scale(doubt)

@@ -16,7 +16,7 @@ import numpy as np
 from pelorus.converters import twist_noise
 from pelorus.faults import stale
 from pelorus.faults.finding import Finding
-from pelorus.faults.mend import held_to_fit, mend
+from pelorus.faults.mend import findings_of, mend
 from pelorus.io import arrays, trajectory
 from pelorus.io.arrays import Arrays
 from pelorus.io.foreign import ForeignFileError
@@ -41,11 +41,12 @@ def convert(
 
     `twist_timing` None: the data decide. With `keep_ids` stale tracks are not mended.
     """
-    given = recording = read(source)
+    recording = read(source)
     tracks = recording.tracks
     findings: list[Finding] = []
     if fix:
-        recording, findings = mend(recording)
+        mended = mend(recording)
+        recording, findings = mended.recording, list(mended.changes)
     if twist_timing is None:
         recording, finding = timing.choose(recording)
         findings.append(finding)
@@ -53,7 +54,7 @@ def convert(
         recording = recording.with_header(twist_timing=twist_timing)
     if fix:
         recording, finding = twist_noise.suggest(recording)
-        recording, findings = held_to_fit(given, recording, [*findings, finding])
+        findings += [finding, *findings_of(recording)]  # anew, for the timing is another
     if keep_ids:
         recording = replace(recording, tracks=tracks)
         findings = [_left_alone(finding) for finding in findings]

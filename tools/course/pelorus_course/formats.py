@@ -9,7 +9,7 @@ import typer
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing, TimingOrAuto
 from pelorus.commands.conversion import write
-from pelorus.faults.mend import held_to_fit
+from pelorus.faults.mend import findings_of
 
 from pelorus_course import ece276a as ece276a_converter
 from pelorus_course import matlab
@@ -65,7 +65,7 @@ def starry_night(
 ) -> None:
     """A .mat of UTIAS's Starry Night, with its landmarks as known ones."""
     recording = matlab.starry_night(source, twist_timing.value_in_header, landmark_sigma)
-    write(*held_to_fit(recording, recording, []), target)
+    write(recording, findings_of(recording), target)
 
 
 @app.command(
@@ -79,4 +79,4 @@ def klt(
 ) -> None:
     """A KITTI drive with KLT stereo tracks (.mat)."""
     recording = matlab.klt(source, twist_timing.value_in_header)
-    write(*held_to_fit(recording, recording, []), target)
+    write(recording, findings_of(recording), target)

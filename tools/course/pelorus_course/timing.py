@@ -7,12 +7,13 @@ two noisy readings has less noise and would win for that alone.
 
 from __future__ import annotations
 
-from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
 from pelorus.faults.likelihood import with_ratio
 from pelorus.io.recording import Recording
 from pelorus.tracking.visual_motion import seen_pairs
 from pelorus.wire.frames import TwistTiming
+
+from pelorus_course.duel import TOO_FEW, duel
 
 Z_MIN = 3.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from pelorus.check.mount import CAMERA_TURN
+from pelorus.check.calibration import CAMERA_TURN
 from pelorus.check.parameters import Tuned, of_process, starting
 from pelorus.check.tracks_noise import DRIFT
 from pelorus.wire.frames import Header

@@ -10,13 +10,12 @@ from pelorus.check import changes
 from pelorus.check.calibration import calibration
 from pelorus.check.covering import CALIBRATE, covering
 from pelorus.check.estimated import without_clock
-from pelorus.check.halves_alike import with_halves_alike
+from pelorus.check.halves_alike import with_halves_alike, with_shared_rows
 from pelorus.check.held import held_against
 from pelorus.check.known import Known
 from pelorus.check.options import Settings, options_of
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
-from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
 from pelorus.check.verdict import Grade, JudgedRun, Remark, Verdict, of_search, verdict_of
 from pelorus.errors import PelorusError
@@ -90,7 +89,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
         return Checked(verdict_of(None, known), None, [], [], [], [], None)
     step("noises, clock and biases")
     one_clock = all(fault.name != "clock-turns" for fault in known.faults)
-    found = tune(bench, without_clock(given), one_clock)
+    found = tune(bench, without_clock(given), known.judged.agreed, one_clock)
     if "calibrate" in given:
         found = replace(found, settings=found.settings | {"calibrate": given["calibrate"]})
     if any(fault.lasts for fault in known.faults):

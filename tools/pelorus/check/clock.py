@@ -16,6 +16,7 @@ import numpy as np
 
 from pelorus.check.options import Settings
 from pelorus.check.outcome import OFFSET, OFFSET_MOST_S, Bench, Outcome
+from pelorus.faults.agreement import Agreement
 from pelorus.math.motion import Times
 from pelorus.wire.layout import Floats
 
@@ -25,6 +26,7 @@ COARSE_S = 0.01  # least step between two offsets that are tried
 NEAR_STEPS = 2  # so many steps where the offset is roughly known
 NEAR_S = 0.04  # to either side of the best one; farther off the cost is no parabola
 SHRINK = 3.0
+SURE = 4.0  # sigmas
 # Middle of the interval that a reading describes, in intervals after its stamp, by timing.
 MIDDLES = {"start": 0.5, "mid": 0.0, "end": -0.5}
 FINEST_S = 2e-5
@@ -41,12 +43,32 @@ class Offset:
     bend_s: float = float("inf")  # sigma by the curvature alone
 
     @property
-    def gain(self) -> float:
-        """Returns -2 ln of the likelihood ratio against no offset."""
-        return (self.best_s / self.sigma_s) ** 2 if self.sigma_s > 0 else 0.0
+    def is_near(self) -> bool:
+        """Returns whether the truth is that near that offsets about this one suffice."""
+        return SURE * self.sigma_s < NEAR_S
+
+    def gain_over(self, was_s: float) -> float:
+        """Returns -2 ln of the likelihood ratio against an offset of `was_s`."""
+        return ((self.best_s - was_s) / self.sigma_s) ** 2 if self.sigma_s > 0 else 0.0
 
 
 UNTOLD = Offset(0.0, float("inf"))
+
+
+def of_fit(agreed: Agreement | None) -> Offset:
+    """Returns the offset by the fit over pairs of frames; unknown where that tells none.
+
+    Replays then tell it better by a third: to a filter a point is known from all frames that saw
+    it, to a pair from two.
+    """
+    if agreed is None or not np.isfinite(agreed.offset_sigma_s):
+        return UNTOLD
+    return Offset(agreed.offset_s, agreed.offset_sigma_s)
+
+
+def surer(one: Offset, other: Offset) -> Offset:
+    """Returns that of two estimates which is known better; `other` where both are alike."""
+    return one if one.sigma_s < other.sigma_s else other
 
 
 def of_twists(bench: Bench, settings: Settings, about_s: float | None = None) -> Offset:

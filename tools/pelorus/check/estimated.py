@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.check.calibration import CalibrationDoubts
-from pelorus.check.mount import SURE, Turned
+from pelorus.check.calibration import TURN_SURE, CalibrationDoubts, Turned
 from pelorus.check.options import Settings
 from pelorus.wire.calibrated import PARTS, Calibrated, CalibrationPart, last_calibrated
 from pelorus.wire.frames import Message
@@ -49,7 +48,7 @@ class Estimated:
     @property
     def answers_turn(self) -> bool:
         """Returns whether the filter's estimate explains the turn that the search found."""
-        return bool(self.estimate.estimated >> TURN.start & 1) and (self.apart or 0.0) <= SURE
+        return bool(self.estimate.estimated >> TURN.start & 1) and (self.apart or 0.0) <= TURN_SURE
 
     def words(self) -> str:
         """Returns the estimate as one sentence."""
@@ -73,13 +72,13 @@ class Estimated:
                 "right, take it over (pelorus info shows it); if not, an axis, a scale or a clock "
                 "is wrong"
             )
-        if self.apart is not None and self.apart > SURE:
+        if self.apart is not None and self.apart > TURN_SURE:
             said += f"; the search sees the camera turned otherwise, by {self.apart:.1f} sigma"
         return said
 
     @property
     def is_doubtful(self) -> bool:
-        return bool(self.off or self.refused) or (self.apart or 0.0) > SURE
+        return bool(self.off or self.refused) or (self.apart or 0.0) > TURN_SURE
 
 
 def _with_sigma(part: CalibrationPart, value: float, sigma: float) -> str:

@@ -12,6 +12,8 @@ The factor is predicted before it is tried: where errors are noise, halves diffe
 expected. Where they do not, the cause is another one (cars, a scale, a clock), which no noise
 covers. Larger noises must not make the filter surer either: it widens its covariance while pictures
 and twists contradict each other (NOISE_MISFIT), and large noises can hide that they do.
+
+Rows that show a rectification to be off tell whose error it is: there pixel-sigma alone grows.
 """
 
 from __future__ import annotations
@@ -25,7 +27,10 @@ from pelorus.check.apart import Inflated, Parts
 from pelorus.check.options import Settings
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned, larger, unless_surer
+from pelorus.check.tracks_noise import differs_clearly
 from pelorus.wire.frames import Kind
+
+PIXEL_SIGMA = "pixel-sigma"
 
 
 def with_halves_alike(bench: Bench, tuned: Tuned) -> Tuned:
@@ -61,3 +66,18 @@ def inflate(parts: Parts, of: Callable[[float], Settings]) -> Inflated:
     times = float(np.sqrt(before.ratio / before.expected))
     after = parts.apart(of(times))
     return Inflated(times, before, after) if after.ratio <= after.by_chance else stays
+
+
+def with_shared_rows(bench: Bench, tuned: Tuned) -> Tuned:
+    """Returns the settings with at least the sigma that the rectification's error needs.
+
+    It comes before halves of the points are compared, for here the source of the error is known.
+    No sigma is taken that makes the filter surer.
+    """
+    shared_px = tuned.noise.rows_px
+    if PIXEL_SIGMA not in tuned.settings or not shared_px > 0:
+        return tuned
+    was_px = float(tuned.settings[PIXEL_SIGMA])
+    if not (shared_px > was_px and differs_clearly(shared_px, was_px)):
+        return tuned
+    return unless_surer(bench, tuned, tuned.settings | {PIXEL_SIGMA: f"{shared_px:.3g}"})

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pelorus.check import clock, scale, slots, tuning_imu
+from pelorus.check import calibration, clock, slots, tuning_imu
 from pelorus.check.biases import WIDE, biases_by_halves, gyro_bias_in_drift
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, SCALE, Bench
@@ -31,6 +31,7 @@ from pelorus.check.parameters import (
 from pelorus.check.search import COARSE, COARSE_FRAMES, BestFound, search_noises
 from pelorus.check.tracks_noise import DRIFT, TrackNoise, differs_clearly, track_noise
 from pelorus.converters.twist_noise import TwistSpread, difference_of_a_reading
+from pelorus.faults.agreement import Agreement
 
 SPREAD_FRAMES = 20  # enough to measure a spread to a fifth, as a start
 FINE = (1.3, 1.15)
@@ -39,16 +40,19 @@ ALIKE = "one sigma for all axes"
 OF_AXES = (2.0, 1.5)  # factors from one sigma for all axes to one for each
 
 
-def tune(bench: Bench, given: Settings, one_clock: bool = True) -> Tuned:
-    """Finds the settings of a recording with twists.
+def tune(bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bool = True) -> Tuned:
+    """Finds the settings of a recording.
 
-    `given` holds wherever nothing better is found. `one_clock`: velocities and rates of turn share
-    a clock; otherwise no offset suits both.
+    `given` holds wherever nothing better is found. `agreed` is how far camera and body agree, if
+    that is known: where the search for the clock begins. `one_clock`: velocities and rates of turn
+    share a clock; otherwise no offset suits both.
     """
-    return tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given, one_clock)
+    if bench.by_imu:
+        return tuning_imu.tune(bench, given, clock.of_fit(agreed))
+    return _tune(bench, given, agreed, one_clock)
 
 
-def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
+def _tune(bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bool) -> Tuned:
     before = bench.run(given)
     noise = track_noise(bench.examined)
     start = starting(bench.header, given, TWIST)
@@ -66,14 +70,16 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
         return Tuned(settings, before, bench.run(settings), noise, [words])
     rough = fixed | WIDE | slots.fewer(given)
     values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)
-    offset = clock.of_twists(bench, rough | written(values, TWIST)) if one_clock else clock.UNTOLD
-    if offset.gain > PAYS:  # a wrong clock is not noise, so it comes first
+    offset = clock.of_fit(agreed) if one_clock else clock.UNTOLD
+    if one_clock and not offset.is_near:
+        offset = clock.of_twists(bench, rough | written(values, TWIST))
+    if offset.gain_over(float(rough[OFFSET])) > PAYS:  # a wrong clock is no noise: it comes first
         rough[OFFSET] = f"{offset.best_s:.6f}"
         values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, values, TWIST, COARSE).values
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
     fixed, of_bias = biases_by_halves(bench, moved, values)
-    off = scale.off_by(bench, moved | written(values, TWIST))
+    off = calibration.scale_off_by(agreed)
     if one_clock:
         about_s = offset.best_s if np.isfinite(offset.sigma_s) else None
         fixed, found, of_clock = clocked(bench, fixed, values, given, off, about_s)
@@ -83,7 +89,7 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
     offset_s = float(fixed.pop(OFFSET))
     settings = merged(fixed | written(found.values, TWIST)) | offset_settings(offset_s)
     said = [of_bias, of_clock, of_axes]
-    lasting = [scale.words(off)] if off else []
+    lasting = [calibration.scale_words(off)] if off else []
     outcome = found.outcome
     return Tuned(settings, before, outcome, noise, said, offset_s, [of_clock], lasting=lasting)
 
@@ -154,7 +160,7 @@ def clocked(
     if np.isfinite(offset.sigma_s):
         words = f"twist-timing {timing}: no offset of the camera's clock is likelier than yours "
         words += f"(known to {2e3 * offset.sigma_s:.2g} ms)"
-        if ((offset.best_s - was_s) / offset.sigma_s) ** 2 > PAYS:
+        if offset.gain_over(was_s) > PAYS:
             settings, words = _moved(bench, settings, offset, timing)
     else:
         words = f"twist-timing {timing} is the likeliest"
@@ -174,16 +180,17 @@ def _moved(
     """Returns the settings with the offset, or with the timing that moves the readings as far."""
     period_s = clock.seconds(bench.examined.twist_t_ns)
     near_s = max(3 * offset.sigma_s, 0.25 * period_s)
+    gain = offset.gain_over(0.0)
     for name in ("start", "end"):
         as_far_s = (clock.MIDDLES[timing] - clock.MIDDLES[name]) * period_s
         if name != timing and abs(offset.best_s - as_far_s) < near_s:
-            words = f"twist-timing is {name}, not {timing} (likelihood {offset.gain:+.0f}), or the "
+            words = f"twist-timing is {name}, not {timing} (likelihood {gain:+.0f}), or the "
             words += f"camera's clock is {abs(as_far_s) * 1e3:.0f} ms off: one is like the other"
             return {**settings, "twist-timing": name, OFFSET: "0"}, words
     late = "late" if offset.best_s < 0 else "early"
     words = (
         f"the camera's clock is {abs(offset.best_s) * 1e3:.0f} ms {late} beside that of the "
-        f"twists, known to {2e3 * offset.sigma_s:.2g} ms (likelihood {offset.gain:+.0f})"
+        f"twists, known to {2e3 * offset.sigma_s:.2g} ms (likelihood {gain:+.0f})"
     )
     return {**settings, OFFSET: f"{offset.best_s:.6f}"}, words
 

@@ -41,8 +41,11 @@ TOLD = 9.0  # -2 ln of the likelihood ratio: 3 sigma, to either side
 TOLD_FACTOR = 3.0
 
 
-def tune(bench: Bench, given: Settings) -> Tuned:
-    """Finds the settings of a recording with an IMU; `given` holds unless others are better."""
+def tune(bench: Bench, given: Settings, of_fit: clock.Offset) -> Tuned:
+    """Finds the settings of a recording with an IMU; `given` holds unless others are better.
+
+    `of_fit` is the camera's clock by the fit, if that tells one.
+    """
     before = bench.run(given)
     noise = track_noise(bench.examined)
     values = start = starting(bench.header, given, IMU | WALKS)
@@ -50,14 +53,15 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     side[OFFSET] = side.pop("camera-offset", "0")
     said: list[str] = []
     if noise.drifts:
-        return _of_drifting_tracks(bench, side, values, before, noise)
+        return _of_drifting_tracks(bench, side, values, before, noise, of_fit)
     walks = {name: start[name] for name in WALKS}
     values = {name: start[name] for name in IMU}
     side |= written(walks, WALKS)
-    values, offset = _roughly(bench, side, values)
+    values, offset = _roughly(bench, side, values, of_fit)
     side[OFFSET] = f"{offset.best_s:.6f}"
     values = search_noises(bench, side | slots.fewer(given), values, IMU, MIDDLE).values
-    offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s, clock.NEAR_STEPS)
+    ran = clock.of_imu(bench, side | written(values, IMU), offset.best_s, clock.NEAR_STEPS)
+    offset = clock.surer(of_fit, ran)
     side, words = _clock(side | written(values, IMU), offset, given)
     said.append(words)
     side, words = _walks(bench, side, walks)
@@ -80,24 +84,29 @@ def _settings() -> set[str]:
 
 
 def _roughly(
-    bench: Bench, side: Settings, values: Mapping[str, float]
+    bench: Bench, side: Settings, values: Mapping[str, float], of_fit: clock.Offset
 ) -> tuple[dict[str, float], clock.Offset]:
-    """Searches noises and clock in turn, with few landmarks.
+    """Searches noises and, where the fit does not tell it, the clock in turn, with few landmarks.
 
     The noises use the drive's beginning. The clock is searched with larger IMU noises, which widen
     the valley of its cost.
     """
+    was_s = float(side[OFFSET])
     short = {**side, **slots.fewer(side), LENGTH: COARSE_FRAMES}
+    if of_fit.is_near:
+        offset = of_fit if of_fit.gain_over(was_s) > PAYS else replace(of_fit, best_s=was_s)
+        short[OFFSET] = f"{offset.best_s:.6f}"
+        return search_noises(bench, short, values, IMU, COARSE).values, offset
     coarse = search_noises(bench, short, values, IMU, COARSE).values
     loose = {name: LOOSE * max(coarse[name], values[name]) for name in ("gyro", "accel")}
     loose["pixel"] = coarse["pixel"]
     rough = {**side, **slots.fewer(side), **written(loose, IMU)}
-    offset = clock.of_imu(bench, rough, float(side[OFFSET]))
-    if offset.gain > PAYS:
+    offset = clock.of_imu(bench, rough, was_s)
+    if offset.gain_over(was_s) > PAYS:
         short[OFFSET] = f"{offset.best_s:.6f}"
         coarse = search_noises(bench, short, coarse, IMU, COARSE).values
     else:
-        offset = replace(offset, best_s=float(side[OFFSET]))
+        offset = replace(offset, best_s=was_s)
     return coarse, offset
 
 
@@ -106,7 +115,7 @@ def _clock(side: Settings, offset: clock.Offset, given: Settings) -> tuple[dict[
     was_s = float(given.get("camera-offset", "0"))
     known = f"known to {2e3 * offset.sigma_s:.2g} ms" if np.isfinite(offset.sigma_s) else "untold"
     # by the parabola: a single cost depends on how many readings a frame averages
-    gain = ((offset.best_s - was_s) / offset.sigma_s) ** 2
+    gain = offset.gain_over(was_s)
     if gain < PAYS:
         here = {**side, OFFSET: f"{was_s:.6f}"}
         return here, f"the clocks of camera and IMU agree as they are set ({known})"
@@ -241,13 +250,15 @@ def _of_drifting_tracks(
     values: Mapping[str, float],
     before: Outcome,
     noise: TrackNoise,
+    of_fit: clock.Offset,
 ) -> Tuned:
     """Keeps the IMU's given noises; takes the pixel-sigma that covers the tracks' drift."""
     values = dict(values)
     if differs_clearly(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     settings = {**side, **noise.setting(side), **written(values, PIXEL | IMU | WALKS)}
-    offset = clock.of_imu(bench, settings | slots.fewer(settings), float(side[OFFSET]))
+    near = (of_fit.best_s, clock.NEAR_STEPS) if of_fit.is_near else (float(side[OFFSET]),)
+    offset = clock.surer(of_fit, clock.of_imu(bench, settings | slots.fewer(settings), *near))
     settings, words = _clock(settings, offset, {"camera-offset": side[OFFSET]})
     outcome = bench.run(settings)
     offset_s = float(settings.pop(OFFSET))

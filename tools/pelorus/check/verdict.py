@@ -14,13 +14,17 @@ from enum import IntEnum
 
 import numpy as np
 
-from pelorus.check.calibration import CalibrationDoubts, calibration
+from pelorus.check.calibration import (
+    CAMERA_TURN,
+    CalibrationDoubts,
+    Doubt,
+    Turned,
+    calibration,
+)
 from pelorus.check.covering import covering, noises_are_usual, not_covered
 from pelorus.check.estimated import Estimated, estimated
 from pelorus.check.known import Known, known_of
-from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned
-from pelorus.check.scale import Doubt
 from pelorus.check.tracks_noise import DRIFT, differs_clearly
 from pelorus.evaluate.evaluation import judge
 from pelorus.evaluate.frame_table import BIASES, FrameTable, frame_table

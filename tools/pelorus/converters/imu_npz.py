@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pelorus.converters import imu_noise, renewal
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
-from pelorus.faults.mend import held_to_fit
+from pelorus.faults.mend import findings_of
 from pelorus.io import arrays, foreign
 from pelorus.io.arrays import Arrays
 from pelorus.io.foreign import ForeignFileError
@@ -103,7 +103,7 @@ def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
         tracks = recording.tracks
         shuffle = None if choices.seed is None else chance
         recording = replace(recording, tracks=renewal.with_new_ids(tracks, shuffle))
-    return held_to_fit(recording, recording, findings)
+    return recording, [*findings, *findings_of(recording)]
 
 
 def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, imu_noise.TrueMotion]:

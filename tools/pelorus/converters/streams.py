@@ -23,7 +23,7 @@ from pelorus.errors import PelorusError
 from pelorus.eyes.front_end import Eyes, Shown, track
 from pelorus.faults import stale
 from pelorus.faults.finding import Finding
-from pelorus.faults.mend import held_to_fit, mend
+from pelorus.faults.mend import findings_of, mend
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
@@ -213,14 +213,13 @@ def converted(
     if not fix or not len(made.tracks):
         return made, placed
     if not isinstance(found.motion, Twists):
-        return held_to_fit(made, made, placed)
+        return made, [*placed, *findings_of(made)]
     if not found.motion.is_whole:
         made, finding = stale.mend(made)
         return made, [*placed, finding]
-    given = made
-    made, findings = mend(made)
-    made, finding = twist_noise.suggest(made)
-    return held_to_fit(given, made, [*placed, *findings, finding])
+    mended = mend(made)
+    made, finding = twist_noise.suggest(mended.recording)
+    return made, [*placed, *mended.changes, finding, *mended.told]
 
 
 # --- motion ---------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pelorus.faults.agreement import Agreement
 from pelorus.faults.fault import Fault
 from pelorus.io.recording import Recording
+from pelorus.math.se3 import Poses
 from pelorus.wire.frames import TwistTiming
 from pelorus.wire.layout import Floats
 
@@ -40,7 +41,7 @@ def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
     arm = -T.R.T @ T.p
     known = np.linalg.inv(place_covariance(recording, agreed))
     as_given = float(agreed.lever_m @ known @ agreed.lever_m)
-    best, likely = 0.0, ""
+    best, likely, mended = 0.0, "", T
     for place, words in (
         (T.p, "[R | p] with the camera's position p in the body in place of -R p"),
         (-arm, "the translation with the wrong sign"),
@@ -52,13 +53,14 @@ def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
         if off > PLACE_SURE:  # neither convention explains the place
             continue
         if float(np.sqrt(apart @ known @ apart)) > LEVER_APART and gain > max(best, LEVER_SURE):
-            best, likely = gain, words
+            best, likely, mended = gain, words, Poses(T.R, -T.R @ place)
     if likely:
         yield Fault(
             "lever",
             f"turns put the camera {_metres(arm + agreed.lever_m)} in the body, the extrinsic "
             f"puts it {_metres(arm)}: it looks like {likely}",
             ratio=best,
+            extrinsic=mended,
         )
 
 

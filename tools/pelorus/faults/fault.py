@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pelorus.faults.likelihood import with_ratio
+from pelorus.math.se3 import Poses
 
 UNTOLD = "untold"  # no fault, but not called good either
 
@@ -22,6 +23,7 @@ class Fault:
     ratio: float | None = None  # 2 ln of the likelihood ratio with and without it
     # that make up for what is off, or estimate it; `calibrate` is added to what is there
     settings: Mapping[str, str] = field(default_factory=dict)
+    extrinsic: Poses | None = None  # T_CB with which the recording has no such fault
 
     @property
     def sentence(self) -> str:

@@ -41,6 +41,7 @@ from pelorus.faults.two_views import TwoViews
 from pelorus.faults.world_axes import world_axes
 from pelorus.io.recording import Recording
 from pelorus.math.axes import turns
+from pelorus.math.se3 import Poses
 from pelorus.wire.layout import Floats
 
 FIT_LEAST = 0.6  # share of the point pairs that one motion explains
@@ -157,15 +158,14 @@ def _of_imu(recording: Recording, seen: CameraMotion) -> Iterator[Fault]:
             "time-apart", "readings and frames are of different times, hardly any in common"
         )
         return
-    given = recording.T_CB.R
-    why = imu_axes.explained(found, given)
+    why = imu_axes.explained(found, recording.T_CB.R)
     if why is None:
         return
     at_times = _at_times(recording, seen, body)
     if at_times is not None:
         yield at_times
         return
-    fault = _why(why, given)
+    fault = _why(why, recording.T_CB)
     if fault is not None:
         none = replace(why, of_turn=np.eye(3), of_force=np.eye(3))
         yield replace(fault, ratio=found.held_against(none) - found.held_against(why))
@@ -192,20 +192,20 @@ def _at_times(recording: Recording, seen: CameraMotion, body: ImuBody) -> Fault 
     )
 
 
-def _why(why: imu_axes.Explained, given: Floats) -> Fault | None:
+def _why(why: imu_axes.Explained, given: Poses) -> Fault | None:
     """Returns the explanation as a fault; None where a turn is too small to matter."""
     off = angle_between(why.of_turn, np.eye(3))
     if why.name == "no-fit":
         words = "camera and IMU do not tell the same motion, and no known fault explains why"
         return Fault("no-fit", words)
     if why.name == "inverted":
-        return _inverted(angle_between(given, given.T))
+        return _inverted(angle_between(given.R, given.R.T))
     if why.name == "axes":
         words = f"the IMU's axes are turned or mirrored: {why.words} {_words(why.F)}"
         return Fault("axes", words)
     if why.name != "turned":
         return Fault(why.name, why.words)
-    return _turned(given, given @ why.of_turn, off) if off > TURNED_DEG else None
+    return _turned(given, given.R @ why.of_turn, off) if off > TURNED_DEG else None
 
 
 def _unfit(frames: int, fit: float) -> Iterator[Fault]:
@@ -288,7 +288,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
         if by_pitch and HEADED_SHARE * off < headed and off < NEAR_DEG:
             fault = _pitched(f"{headed:.0f}")  # the rest is roll, which is known worse
         else:
-            fault = _turned(given, found.R, off)
+            fault = _turned(recording.T_CB, found.R, off)
         yield replace(fault, ratio=sigmas**2)
 
 
@@ -328,7 +328,11 @@ def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
     if len(won) > 1 and np.array_equal(of_turn.F, of_way.F):
         words = f"the twists have {_words(of_turn.F)}"
     ratio = sum(found.ratio for found in won.values())
-    yield Fault("axes", f"the body's axes are turned or mirrored: {words}", ratio=ratio)
+    F, *others = (found.F for found in won.values())
+    is_turn = all(np.array_equal(F, other) for other in others) and np.linalg.det(F) > 0
+    mended = Poses(recording.T_CB.R @ F, recording.T_CB.p) if is_turn else None
+    words = f"the body's axes are turned or mirrored: {words}"
+    yield Fault("axes", words, ratio=ratio, extrinsic=mended)
 
 
 def _words(F: Floats) -> str:
@@ -344,14 +348,14 @@ def _inverted(off: float) -> Fault:
     )
 
 
-def _turned(given: Floats, found: Floats, off: float) -> Fault:
-    if angle_between(found, given.T) < NEAR_DEG:
+def _turned(given: Poses, found: Floats, off: float) -> Fault:
+    if angle_between(found, given.R.T) < NEAR_DEG:
         return _inverted(off)
-    turned = min(turns(), key=lambda F: angle_between(found, given @ F))
-    if not np.allclose(turned, np.eye(3)) and angle_between(found, given @ turned) < AXES_DEG:
-        words = _words(turned)
-        return Fault("axes", f"the body's axes are turned or mirrored: the twists have {words}")
-    axis = _axis_of(found @ given.T)
+    turned = min(turns(), key=lambda F: angle_between(found, given.R @ F))
+    if not np.allclose(turned, np.eye(3)) and angle_between(found, given.R @ turned) < AXES_DEG:
+        words = f"the body's axes are turned or mirrored: the twists have {_words(turned)}"
+        return Fault("axes", words, extrinsic=Poses(given.R @ turned, given.p))
+    axis = _axis_of(found @ given.R.T)
     if abs(axis[0]) > MOSTLY and off < PITCH_MOST_DEG:
         return _pitched(f"{off:.0f}")
     return Fault("extrinsic", f"the extrinsic's rotation is off by {off:.0f} degrees")

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""All examinations, in the order in which they build on each other."""
+"""Mends what a recording's own data show to be wrong, and names the rest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pelorus.faults import axes, lever, stale
+from pelorus.faults import stale
 from pelorus.faults.agreement import Agreement
 from pelorus.faults.amounts import PLACE_TOLD_M
 from pelorus.faults.fault import UNTOLD, Fault
@@ -16,50 +16,73 @@ from pelorus.faults.finding import Finding
 from pelorus.faults.geometry import Judged
 from pelorus.faults.named import judged
 from pelorus.io.recording import Recording
+from pelorus.math.axes import name
+from pelorus.math.se3 import Poses
+from pelorus.wire.layout import Floats
 
 NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"
 CANNOT = "what is off by less than four times as much cannot be seen in this drive"
 BEHIND = "before that is mended this drive cannot tell scale, clock and the camera's place"
 SCALE_TOLD = 0.02  # sigma of the scale above which a drive shows little of it
+REMEDIES = 2  # of the extrinsic: its axes, and then its place, which the turns tell
 
 
-def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """Finds and mends what the recording's own data show to be wrong.
+@dataclass(frozen=True)
+class Mended:
+    """A recording, what was changed in it or left, and what is still to be said of it."""
 
-    Tracks come first, for the others measure with them; axes come before the lever, which uses the
-    body's displacement by the twists.
+    recording: Recording
+    changes: list[Finding]
+    told: list[Finding]
+
+
+def mend(given: Recording) -> Mended:
+    """Mends stale tracks, and an extrinsic of other axes or of another convention.
+
+    Tracks come first, for all else measures with them. What is changed is kept only if the mended
+    recording has no fault that stops.
     """
-    findings = []
-    for examine in (stale.mend, axes.mend, lever.mend):
-        recording, finding = examine(recording)
-        findings.append(finding)
-    return recording, findings
-
-
-def held_to_fit(
-    given: Recording, mended: Recording, findings: Sequence[Finding]
-) -> tuple[Recording, list[Finding]]:
-    """Returns the mended recording if all fits with it, else the given one; names the other faults.
-
-    A changed extrinsic is kept only so.
-    """
-    found = judged(mended)
-    if mended.tracks is not given.tracks and any(
-        fault.name == NOTHING_LASTS for fault in found.faults
-    ):
+    recording, of_tracks = stale.mend(given)
+    found = judged(recording)
+    if of_tracks.found and found.faults and found.faults[0].name == NOTHING_LASTS:
         # frozen pictures, not single stale tracks
-        mended = replace(mended, tracks=given.tracks)
-        findings = [_taken_back(finding, found.faults[0], stale.SUBJECT) for finding in findings]
-        found = judged(mended)
-    changed = mended.header.R_CB is not given.header.R_CB
-    changed |= mended.header.t_CB_m is not given.header.t_CB_m
-    wrong = [fault for fault in found.faults if fault.stops]
-    if changed and wrong:
-        findings = [_taken_back(f, wrong[0], axes.SUBJECT, lever.SUBJECT) for f in findings]
-        mended = mended.with_extrinsic(given.T_CB)
-        found = judged(mended)
-    return mended, [*findings, *_known(found), *(_as_finding(fault) for fault in found.faults)]
+        words = f"left as given: even then it would not fit ({found.faults[0].words})"
+        of_tracks = replace(of_tracks, is_conclusive=False, found=False, action=words)
+        recording, found = given, judged(given)
+    changes = [of_tracks]
+    fits, now, remedies = recording, found, list[Finding]()
+    while len(remedies) < REMEDIES:
+        fault = next((fault for fault in now.faults if fault.extrinsic is not None), None)
+        if fault is None or fault.extrinsic is None:
+            break
+        action = _changed(fits.T_CB, fault.extrinsic)
+        remedies.append(Finding(fault.name, True, fault.sentence, action))
+        fits = fits.with_extrinsic(fault.extrinsic)
+        now = judged(fits)
+    if remedies and not any(fault.stops for fault in now.faults):
+        recording, found, changes = fits, now, [*changes, *remedies]
+    return Mended(recording, changes, _told(found))
+
+
+def findings_of(recording: Recording) -> list[Finding]:
+    """Returns the faults of a recording that is not to be changed, and what it cannot show."""
+    return _told(judged(recording))
+
+
+def _changed(given: Poses, other: Poses) -> str:
+    """Returns in words what is replaced in the extrinsic."""
+    if np.array_equal(given.R, other.R):
+        return f"t_CB {_metres(given.p)} replaced by {_metres(other.p)}"
+    return f"R_CB turned: the body's axes are now {name(other.R)}"
+
+
+def _metres(p: Floats) -> str:
+    return "(" + ", ".join(f"{x:.3f}" for x in p) + ") m"
+
+
+def _told(found: Judged) -> list[Finding]:
+    return [*_known(found), *(_as_finding(fault) for fault in found.faults)]
 
 
 def _known(found: Judged) -> Iterator[Finding]:
@@ -84,13 +107,6 @@ def known_words(agreed: Agreement) -> str:
         f"scale of the way {agreed.scale:.3f} +- {agreed.scale_sigma:.3f}, {clock}, the camera's "
         f"place {place}"
     )
-
-
-def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
-    if finding.subject not in subjects or not finding.found:
-        return finding
-    action = f"left as given: even then it would not fit ({because.words})"
-    return replace(finding, is_conclusive=False, found=False, action=action)
 
 
 def _as_finding(fault: Fault) -> Finding:

@@ -32,6 +32,7 @@ OPTIONS = {
     "distributed.scheduler.worker-saturation": 1.0,
     # Dask has freed memory given back at once, so each large array of numpy's asks for it anew.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+    "distributed.worker.profile.enabled": False,  # a hundred samples a second, for a dashboard
 }
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PELORUS_THREADS": "1"}
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from pelorus.faults.likelihood import of_share
 from pelorus.wire.layout import Floats
 
