@@ -73,13 +73,12 @@ def csv(
     calibration: list[Path] = typer.Option(
         [],
         help="Of Kalibr (and a second time, its IMU file), ROS, OpenCV, ORB-SLAM3, VINS-Fusion, "
-        "Basalt, OKVIS, SVO, maplab, ZED or OAK (docs/CONVERT.md), or, of a rectified pair, "
-        "JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB, as three rows of three, with "
-        "t_CB_m (body to left camera) or R_BC with t_BC_m (the camera's pose in the body); "
-        "optional image_width_px, image_height_px, body_axes (forward-left-up, forward-right-down, "
-        "other), twist_timing (start, end, mid), name, and noise, an object with some of "
-        "pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, bias_velocity_sigma_mps, "
-        "bias_gyro_sigma_radps.",
+        "Basalt, OKVIS, SVO, maplab, ZED or OAK (docs/CONVERT.md), or, of a rectified pair, JSON: "
+        "fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB, as three rows of three, with t_CB_m "
+        "(body to left camera) or R_BC with t_BC_m (the camera's pose in the body); optional "
+        "image_width_px, image_height_px, body_axes (forward-left-up, forward-right-down, other), "
+        "twist_timing (start, end, mid), name, and noise, an object with some of pixel_sigma_px, "
+        "velocity_sigma_mps, gyro_sigma_radps, bias_velocity_sigma_mps, bias_gyro_sigma_radps.",
     ),
     truth: Path | None = own.TRUTH,
     columns: list[str] = own.COLUMNS,

@@ -181,10 +181,8 @@ class Bag(AbstractContextManager["Bag"]):
         words = (str(error).splitlines() or [type(error).__name__])[0]
         return ForeignFileError(
             self.path,
-            f"cannot be read as a bag: {words}",
-            expected="a whole ROS 1 bag, ROS 2 bag or .mcap is expected (rosbag reindex, ros2 bag "
-            "reindex or "
-            "mcap recover mend one that was cut short)",
+            f"cannot be read as a bag: {words}; a whole ROS 1 bag, ROS 2 bag or .mcap is expected "
+            "(rosbag reindex, ros2 bag reindex or mcap recover mend one that was cut short)",
         )
 
 

@@ -167,10 +167,8 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
         if files.gyro is None and not any(map(table.has, RATES.values())):
             raise ForeignFileError(
                 imu,
-                "has no rates of turn",
-                expected=f"{', '.join(RATES.values())} are expected, or --gyro FILE with them; "
-                "there are: "
-                f"{', '.join(table.names)}",
+                f"has no rates of turn; {', '.join(RATES.values())} are expected, or --gyro FILE "
+                f"with them; there are: {', '.join(table.names)}",
             )
         if files.gyro is None:
             table.leave_out_bad(*FORCES, *RATES.values())

@@ -194,9 +194,8 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
         if len(cells) != 2 or not cells[0].isdecimal() or int(cells[0][:20]) >= NS_MAX:
             raise ForeignFileError(
                 listing,
-                f"holds {' '.join(cells)[:60]!r}",
+                f"holds {' '.join(cells)[:60]!r}; a time in ns, a file are expected",
                 at=f"line {line}",
-                expected="a time in ns, a file are expected",
             )
         path = data / cells[1]
         found = there.pop(path.stem, None)  # a picture may be another kind of file

@@ -165,10 +165,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
     back = np.nonzero(np.diff(seconds) < 0)[0]
     if len(back):
         raise ForeignFileError(
-            path,
-            "stereo_t goes back",
-            at=f"row {back[0] + 1}",
-            expected="rows in order of time are expected",
+            path, "stereo_t goes back; rows in order of time are expected", at=f"row {back[0] + 1}"
         )
     id = file.get("stereo_id", shape=(count,))
     whole = (id == np.floor(id)) & (id >= 0) & (id < 2.0**32)
@@ -176,9 +173,8 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
         row = int(np.argmin(whole))
         raise ForeignFileError(
             path,
-            f"stereo_id is {id[row]:g}",
+            f"stereo_id is {id[row]:g}; a whole number below 2^32 is expected",
             at=f"row {row}",
-            expected="a whole number below 2^32 is expected",
         )
     t_ns, frame = np.unique(np.round(seconds * 1e9).astype(np.int64), return_inverse=True)
     tracks = Tracks.from_rows(
@@ -220,9 +216,8 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
         row = int(wrong[0])
         raise ForeignFileError(
             path,
-            f"the quaternion's norm is {norms[row]:.4f}",
+            f"the quaternion's norm is {norms[row]:.4f}; 1 is expected, in the order x y z w",
             at=f"{key} row {row}",
-            expected="1 is expected, in the order x y z w",
         )
     return np.asarray(scipy.spatial.transform.Rotation.from_quat(quaternions).as_matrix())
 
@@ -239,8 +234,7 @@ def _start_time(path: Path, seconds: float, t_ns: Times) -> int:
         raise ForeignFileError(
             path,
             f"init is of {seconds:.6f} s, the readings of {t_ns[0] * 1e-9:.6f} to "
-            f"{t_ns[-1] * 1e-9:.6f} s",
-            expected="a state within them is expected",
+            f"{t_ns[-1] * 1e-9:.6f} s; a state within them is expected",
         )
     return nearest if abs(nearest - told) <= SAME_TIME_NS else told
 
@@ -317,9 +311,8 @@ class _Calib(Named):
             if off > ALIGNED_M:
                 raise self._wrong(
                     "T_imu_cam1",
-                    f"that of a rectified pair is expected, baseline_m = {baseline:g} to the "
-                    "right of "
-                    "T_imu_cam0",
+                    f"that of a rectified pair is expected, baseline_m = {baseline:g} to the right "
+                    "of T_imu_cam0",
                 )
         return left
 

@@ -116,6 +116,5 @@ def _require_one_sensor(table: Table, t_ns: NDArray[np.int64]) -> None:
             table.path,
             f"{each} rows have one time and differ as those of {each} sensors",
             expected="a column that tells the sensors apart is expected (--rows COLUMN=VALUE takes "
-            "one of "
-            "them), or a file for each",
+            "one of them), or a file for each",
         )

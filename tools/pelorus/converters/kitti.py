@@ -140,9 +140,7 @@ def _stamps(path: Path, count: int) -> Times:
     lines = [line.strip() for line in foreign.text(path).splitlines() if line.strip()]
     if len(lines) != count:
         raise ForeignFileError(
-            path,
-            f"has {len(lines)} times",
-            expected=f"{count} are expected, one for each file in data",
+            path, f"has {len(lines)} times; {count} are expected, one for each file in data"
         )
     t_ns = np.array([_stamp(path, k, line) for k, line in enumerate(lines, 1)], np.int64)
     back = np.nonzero(np.diff(t_ns) <= 0)[0]

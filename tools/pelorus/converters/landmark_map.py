@@ -87,9 +87,8 @@ def _require_world(path: Path, table: Table) -> None:
         if frame != WORLD:
             raise ForeignFileError(
                 path,
-                f"the landmark is in the frame {frame!r}",
+                f"the landmark is in the frame {frame!r}; landmarks in the world's are expected",
                 at=f"row {row}",
-                expected="landmarks in the world's are expected",
             )
 
 

@@ -48,8 +48,7 @@ def rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tra
     if not good.any():
         raise ForeignFileError(
             source,
-            "no pixel is one of the calibration's lenses",
-            expected="pixels as the cameras took them are expected, of the calibration's "
-            "resolution",
+            "no pixel is one of the calibration's lenses; pixels as the cameras took them are "
+            "expected, of the calibration's resolution",
         )
     return replace(tracks, pixels=pixels).at(np.nonzero(good)[0])

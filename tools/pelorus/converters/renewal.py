@@ -91,8 +91,7 @@ def _no_fixed_points(source: Path, why: str) -> ForeignFileError:
     return ForeignFileError(
         source,
         "its observations are not those of points that stand still, seen from the true poses: "
-        f"{why}",
-        expected="a simulated recording is expected for --seed",
+        f"{why}; a simulated recording is expected for --seed",
     )
 
 

@@ -113,9 +113,8 @@ def _of_camera_info(bag: Bag, cameras: Cameras, tree: Tree, remarks: list[str]) 
     if infos is None:
         raise PelorusError(
             f"{bag.path}: which topics of {CAMERA_INFO} are the cameras'? --left-info-topic and "
-            "--right-info-topic are expected, or --calibration FILE (docs/CONVERT.md lists "
-            "which are "
-            f"read); {bag.listing()}"
+            "--right-info-topic are expected, or --calibration FILE (docs/CONVERT.md lists which "
+            f"are read); {bag.listing()}"
         )
     apart = None
     if not infos.have_baseline:
@@ -153,8 +152,7 @@ def _on_body(
     if not body:
         raise PelorusError(
             f"{bag.path}: what moves the body does not name its frame; --body-frame NAME is "
-            "expected, "
-            f"one of {tree.listing}, or --extrinsic FILE"
+            f"expected, one of {tree.listing}, or --extrinsic FILE"
         )
     if not frame:
         raise PelorusError(

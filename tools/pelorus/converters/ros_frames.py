@@ -257,9 +257,7 @@ def gray(where: Path, message: Any, bits: int = 16) -> Gray:
     channels = CHANNELS.get(encoding, 1)
     if encoding not in (*PLAIN, *DEEP, *TO_GRAY):
         known = ", ".join((*PLAIN, *DEEP, *TO_GRAY))
-        raise ForeignFileError(
-            where, f"pictures are encoded as {encoding}", expected=f"{known} are expected"
-        )
+        raise ForeignFileError(where, f"pictures are encoded as {encoding}; {known} are expected")
     if encoding in DEEP:
         return np.asarray(_deep(where, message) >> (bits - 8), np.uint8)
     plain = _lines(where, message, channels)

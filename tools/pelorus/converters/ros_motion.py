@@ -178,9 +178,8 @@ def of_joints(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
         if lacking or len(message.velocity) != len(message.name):
             raise ForeignFileError(
                 bag.path,
-                f"{topic} has the joints {', '.join(message.name)} with "
-                f"{len(message.velocity)} velocities",
-                expected=f"{', '.join(wheels.joints)} with a velocity each are expected",
+                f"{topic} has the joints {', '.join(message.name)} with {len(message.velocity)} "
+                f"velocities; {', '.join(wheels.joints)} with a velocity each are expected",
             )
         return [float(message.velocity[message.name.index(name)]) for name in wheels.joints]
 
@@ -220,10 +219,9 @@ def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
     what = "specific forces" if w else "rates of turn"
     raise ForeignFileError(
         bag.path,
-        f"all its {what} are 0",
+        f"all its {what} are 0; are they on another topic? --imu-topic of the accelerometer and "
+        f"--gyro-topic of the gyro are expected; {bag.listing()}",
         at=topic,
-        expected="are they on another topic? --imu-topic of the accelerometer and --gyro-topic of "
-        f"the gyro are expected; {bag.listing()}",
     )
 
 

@@ -49,10 +49,7 @@ def read(
         sigmas = np.full_like(sigmas, sigma_m)
     if not sigmas.all():
         raise ForeignFileError(
-            bag.path,
-            "messages tell no covariance",
-            at=topic,
-            expected="--position-sigma M is expected",
+            bag.path, "messages tell no covariance; --position-sigma M is expected", at=topic
         )
     local = Ground().local(bag.path / topic.lstrip("/"), places, remarks)
     arm_m = _arm(topic, frame, body, tree, remarks)

@@ -265,8 +265,7 @@ def _require_gravity(readings: Readings) -> None:
             readings.where,
             f"the specific force is {usual:.3g} m/s^2 in the median",
             expected="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
-            "gravity "
-            "been taken away? Raw readings are expected",
+            "gravity been taken away? Raw readings are expected",
         )
 
 

@@ -105,9 +105,8 @@ class Tree:
         if meeting is None:
             raise PelorusError(
                 f"{self.bag.path}: no chain of transforms joins {first!r} and {last!r}: they end "
-                f"at {up[-1]!r} and at {down[-1]!r}; --extrinsic FILE is expected, or "
-                "--body-frame and "
-                f"--camera-frame, one of {self.listing}"
+                f"at {up[-1]!r} and at {down[-1]!r}; --extrinsic FILE is expected, or --body-frame "
+                f"and --camera-frame, one of {self.listing}"
             )
         up, down = up[: up.index(meeting) + 1], down[: down.index(meeting)]
         for child in (*up[:-1], *down):

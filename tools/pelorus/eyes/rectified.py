@@ -131,9 +131,8 @@ class Evidence:
         if _more(self.corners, found) and _tail(seen.as_due, found, self._share) > CHANCE:
             raise PelorusError(
                 f"{shows} {seen.as_due} in the same row, no more than by chance; pictures of a "
-                "rectified pair that were taken together are expected (is one camera covered, "
-                "is the "
-                "largest disparity too small?)"
+                "rectified pair that were taken together are expected (is one camera covered, is "
+                "the largest disparity too small?)"
             )
 
 

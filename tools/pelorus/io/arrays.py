@@ -79,9 +79,7 @@ class Arrays:
         array = self._arrays[self.one_of(key)]
         if array.size != 1 or array.dtype.kind not in "US":
             raise ForeignFileError(
-                self.path,
-                f"{key} is {array.size} of type {array.dtype}",
-                expected="one text is expected",
+                self.path, f"{key} is {array.size} of type {array.dtype}; one text is expected"
             )
         item = array.reshape(()).item()
         return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
@@ -123,8 +121,7 @@ def require_baseline(path: Path, length_m: float) -> None:
             path,
             f"the cameras stand {length_m:g} apart",
             expected=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are expected: are these "
-            "millimetres, or "
-            "squares of the board? Divide so that it is in metres",
+            "millimetres, or squares of the board? Divide so that it is in metres",
         )
 
 

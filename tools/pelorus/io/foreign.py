@@ -68,9 +68,7 @@ def content(path: Path, most: int) -> bytes:
             while piece := stream.read(PIECE_BYTES):
                 size += len(piece)
                 if size > most:
-                    raise ForeignFileError(
-                        path, "is too long", expected=f"at most {most} bytes are expected"
-                    )
+                    raise ForeignFileError(path, f"is too long; at most {most} bytes are expected")
                 pieces.append(piece)
     except OSError as error:
         raise ForeignFileError(path, f"cannot be read: {error.strerror}") from error
@@ -106,9 +104,7 @@ def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
     except UnicodeDecodeError as error:
         bad = error.start
     if bad >= 0:  # a zero, too: UTF-16 without a mark, or unwritten data
-        raise ForeignFileError(
-            path, "is no text", at=f"byte {bad}", expected="text in UTF-8 is expected"
-        )
+        raise ForeignFileError(path, "is no text; text in UTF-8 is expected", at=f"byte {bad}")
     return found
 
 
@@ -255,9 +251,7 @@ def csv_rows(path: Path) -> Csv:
         table.insert(0, comments[-1])
         skipped -= 1
     if not table:
-        raise ForeignFileError(
-            path, "the file is empty", expected="a row of column names is expected"
-        )
+        raise ForeignFileError(path, "the file is empty; a row of column names is expected")
     names, below = table[0], table[1:]
     by_semicolons = len(names) == 1 and ";" in names[0]
     _, more = _comments(below)
@@ -315,15 +309,12 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
         json.dumps(found, ensure_ascii=False).encode("utf-8")
     except RecursionError:
         raise ForeignFileError(
-            path,
-            "is nested too deep",
-            expected="an object with numbers, words and lists of them is expected",
+            path, "is nested too deep; an object with numbers, words and lists of them is expected"
         ) from None
     except UnicodeEncodeError:
         raise ForeignFileError(
             path,
-            "holds half of a surrogate pair (\\ud800 to \\udfff)",
-            expected="whole characters are expected",
+            "holds half of a surrogate pair (\\ud800 to \\udfff); whole characters are expected",
         ) from None
     except json.JSONDecodeError as error:
         raise ForeignFileError(
@@ -332,9 +323,7 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
     except ValueError as error:
         raise ForeignFileError(path, str(error)) from None
     if not isinstance(found, dict):
-        raise ForeignFileError(
-            path, "is JSON without names", expected="an object with names is expected"
-        )
+        raise ForeignFileError(path, "is JSON without names; an object with names is expected")
     return found
 
 
@@ -386,9 +375,7 @@ def yaml_object(path: Path) -> dict[str, Any]:
 def yaml_words(path: Path, words: str) -> dict[str, Any]:
     """Parses the same from the file's text."""
     if len(words) > YAML_BYTES_MAX:
-        raise ForeignFileError(
-            path, "is too long", expected=f"at most {YAML_BYTES_MAX} bytes are expected"
-        )
+        raise ForeignFileError(path, f"is too long; at most {YAML_BYTES_MAX} bytes are expected")
     _require_shallow(path, words)
     yaml = YAML(typ="safe", pure=True)
     yaml.Constructor = _Constructor
@@ -403,9 +390,7 @@ def yaml_words(path: Path, words: str) -> dict[str, Any]:
     except (YAMLError, RecursionError, ValueError) as error:
         raise ForeignFileError(path, f"is no YAML: {_first_line(error)}") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
-        raise ForeignFileError(
-            path, "is YAML without names", expected="names with values are expected"
-        )
+        raise ForeignFileError(path, "is YAML without names; names with values are expected")
     return found
 
 
@@ -421,9 +406,7 @@ def _require_shallow(path: Path, words: str) -> None:
     deepest = max(accumulate((c in "[{") - (c in "]}") for c in words), default=0)
     if deepest > YAML_DEPTH_MAX:
         raise ForeignFileError(
-            path,
-            "is nested too deep",
-            expected="names with numbers, words and lists of them are expected",
+            path, "is nested too deep; names with numbers, words and lists of them are expected"
         )
 
 

@@ -32,9 +32,7 @@ class Named:
     def get(self, name: str) -> Any:
         if name not in self.content:
             there = ", ".join(map(str, self.content)) or "none"
-            raise ForeignFileError(
-                self.path, f"lacks {name}", at=self.at, expected=f"there are: {there}"
-            )
+            raise ForeignFileError(self.path, f"lacks {name}; there are: {there}", at=self.at)
         return self.content[name]
 
     def array(self, name: str, *shape: int) -> Floats:

@@ -80,9 +80,8 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
     if columns < POSE_COLUMNS:
         raise ForeignFileError(
             path,
-            f"has {columns} numbers",
+            f"has {columns} numbers; {POSE_COLUMNS} are expected: t x y z qx qy qz qw",
             at=f"line {sound.rows[0].line}",
-            expected=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
         )
     if in_ns is None:
         in_ns = arrays.are_ns(sound.numbers[:, 0])
@@ -131,8 +130,7 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
             path,
             f"names the columns {', '.join(names[:POSE_COLUMNS])}",
             expected="time, position and quaternion (x y z w, or w first) are expected, in that "
-            "order or "
-            "the quaternion before the position",
+            "order or the quaternion before the position",
         )
     return (1, 4, order) if begin == 4 else (5, 1, order)
 
@@ -247,9 +245,8 @@ def read_kitti(path: Path) -> Poses:
     if len(rows[0].cells) != KITTI_COLUMNS:
         raise ForeignFileError(
             path,
-            f"has {len(rows[0].cells)} cells",
+            f"has {len(rows[0].cells)} cells; {KITTI_COLUMNS} numbers are expected ([R | p])",
             at=f"line {rows[0].line}",
-            expected=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
         )
     numbers = foreign.numbers(path, rows, KITTI_COLUMNS)
     matrices = numbers.reshape(-1, 3, 4)
@@ -257,9 +254,7 @@ def read_kitti(path: Path) -> Poses:
     off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
     if off.max() > 1e-2:
         at = f"line {rows[int(off.argmax())].line}"
-        raise ForeignFileError(
-            path, "holds no rotation", at=at, expected="[R | p] is expected, row by row"
-        )
+        raise ForeignFileError(path, "holds no rotation; [R | p] is expected, row by row", at=at)
     return Poses(se3.nearest_rotation(R), matrices[:, :, 3])
 
 
@@ -281,9 +276,7 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
         t_ns = times_of(times, foreign.rows(times))
         whose = times
     else:
-        raise ForeignFileError(
-            path, "KITTI poses carry no times", expected="give --recording or --times"
-        )
+        raise ForeignFileError(path, "KITTI poses carry no times; give --recording or --times")
     if len(poses.p) > len(t_ns):
         raise ForeignFileError(path, f"{len(poses.p)} poses, but {whose} has {len(t_ns)} times")
     return Trajectory(t_ns[: len(poses.p)], poses)

@@ -55,8 +55,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
     if min(len(poses), len(cameras)) < 2 or len(poses) != len(cameras):
         raise ForeignFileError(
             content.path,
-            f"has {len(cameras)} cameras and {len(poses)} of T_imu_cam",
-            expected="two of each are expected",
+            f"has {len(cameras)} cameras and {len(poses)} of T_imu_cam; two of each are expected",
         )
     lenses = [
         _lens(camera, sizes[k] if k < len(sizes) else [0, 0]) for k, camera in enumerate(cameras)

@@ -50,9 +50,8 @@ class Info(NamedTuple):
         if P[0, 0] <= 0 or K[0, 0] <= 0:
             raise ForeignFileError(
                 self.path,
-                "the camera is not calibrated: K or P is 0",
+                "the camera is not calibrated: K or P is 0; --calibration is expected",
                 at=self.at,
-                expected="--calibration is expected",
             )
         size = self.width_px, self.height_px
         if rectified:
@@ -132,9 +131,8 @@ def pair(first: Named, second: Named, lens: LensModel | None) -> Rig:
     if not infos.have_baseline:
         raise ForeignFileError(
             second.path,
-            "the projection_matrix of neither camera has a baseline",
-            expected="files of a stereo calibration are expected: P[3] of the right one is -fx "
-            "baseline",
+            "the projection_matrix of neither camera has a baseline; files of a stereo calibration "
+            "are expected: P[3] of the right one is -fx baseline",
         )
     return infos.rig()
 

@@ -69,9 +69,7 @@ def is_imu(content: Named) -> bool:
 def camchain(content: Named, asked: Sequence[str] = ()) -> Rig:
     """Reads two cameras: those asked for by name or topic, else the stereo pair."""
     if "cam1" not in content:
-        raise ForeignFileError(
-            content.path, "has one camera, cam0", expected="cam0 and cam1 are expected"
-        )
+        raise ForeignFileError(content.path, "has one camera, cam0; cam0 and cam1 are expected")
     names = [name for name in content.content if CAMERA.fullmatch(str(name))]
     cameras = [content.object(name) for name in sorted(names, key=lambda name: int(name[3:]))]
     if len(cameras) == 2 and not asked:
@@ -96,10 +94,7 @@ def _chained(cameras: Sequence[Named]) -> list[Poses]:
     for camera in cameras[1:]:
         if STEP not in camera:
             raise ForeignFileError(
-                camera.path,
-                "does not say where it stands",
-                at=camera.at,
-                expected=f"{STEP} is expected",
+                camera.path, f"does not say where it stands; {STEP} is expected", at=camera.at
             )
         found.append(se3.compose(pose(camera, STEP), found[-1]))
     return found
@@ -122,9 +117,8 @@ def pair(first: Named, second: Named, step: Poses | None = None) -> Rig:
         if T_1B is None or T_2B is None:
             raise ForeignFileError(
                 second.path,
-                f"{second.at or 'the second camera'} does not say where it stands",
-                expected=f"{STEP} is expected, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of "
-                "both cameras",
+                f"{second.at or 'the second camera'} does not say where it stands; {STEP} is "
+                f"expected, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of both cameras",
             )
         steps = se3.compose(T_2B, se3.inverse(T_1B))
     elif step is None and T_1B is not None and T_2B is not None:
@@ -251,10 +245,7 @@ def _on_body(camera: Named) -> Poses | None:
         return None
     if len(given) > 1:
         raise ForeignFileError(
-            camera.path,
-            f"has {' and '.join(given)}",
-            at=camera.at,
-            expected="one of them is expected",
+            camera.path, f"has {' and '.join(given)}; one of them is expected", at=camera.at
         )
     T = pose(camera, given[0])
     return T if given[0] in TO_CAMERA else se3.inverse(T)

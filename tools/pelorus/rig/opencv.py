@@ -85,9 +85,7 @@ def _model(content: Named, name: str, count: int, asked: LensModel | None) -> Le
     if count not in COEFFICIENTS[model]:
         expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise ForeignFileError(
-            content.path,
-            f"{name} has {count} numbers",
-            expected=f"{expected} are expected for {model}",
+            content.path, f"{name} has {count} numbers; {expected} are expected for {model}"
         )
     return model
 

@@ -69,16 +69,14 @@ def _pair(content: Named, T_LB: Poses | None) -> Rig:
     else:
         raise ForeignFileError(
             content.path,
-            "is of one camera",
-            expected=f"{' or '.join(STEPS)}, Stereo.b, LEFT.K and RIGHT.K, or Camera.bf is "
-            "expected",
+            f"is of one camera; {' or '.join(STEPS)}, Stereo.b, LEFT.K and RIGHT.K, or Camera.bf "
+            "is expected",
         )
     if any(left.coefficients):
         raise ForeignFileError(
             content.path,
-            f"has a baseline alone, and a distortion ({first}.k1)",
-            expected=f"{' or '.join(STEPS)} is expected; with a baseline alone the pictures are "
-            "rectified",
+            f"has a baseline alone, and a distortion ({first}.k1); {' or '.join(STEPS)} is "
+            "expected; with a baseline alone the pictures are rectified",
         )
     plain = Lens(LensModel.NONE, left.intrinsics, (), left.width_px, left.height_px)
     T_RL = Poses(np.eye(3), np.array([-baseline_m, 0.0, 0.0]))

@@ -97,9 +97,7 @@ def without_cameras(paths: Sequence[Path], name: str) -> Calibrated:
     if any(kind.is_one(content) for content in contents for kind in KINDS):
         return read(paths, name)
     if any(not kalibr.is_imu(content) for content in contents) or len(contents) > 1:
-        raise ForeignFileError(
-            paths[-1], "is no IMU's file, or a second one", expected="one is expected"
-        )
+        raise ForeignFileError(paths[-1], "is no IMU's file, or a second one; one is expected")
     imu = kalibr.imu(contents[0]) if contents else ImuModel()
     return Calibrated(Header(NO_CAMERA, name=header_name(name)), imu=imu)
 
@@ -125,33 +123,25 @@ def read_rig(
                 content.path,
                 "is no calibration that is known",
                 expected=f"{', '.join(kind.name for kind in KINDS)} or the project's JSON is "
-                "expected; there "
-                f"are: {', '.join(content.content) or 'no names'}",
+                f"expected; there are: {', '.join(content.content) or 'no names'}",
             )
     found = [kind for kind in kinds if kind is not None]
     if not found:
-        raise ForeignFileError(
-            paths[0], "is of an IMU alone", expected="one of the cameras is expected too"
-        )
+        raise ForeignFileError(paths[0], "is of an IMU alone; one of the cameras is expected too")
     if any(kind is not found[0] for kind in found):
         names = " and ".join(dict.fromkeys(kind.name for kind in found))
-        raise ForeignFileError(
-            paths[0], f"and the others are {names}", expected="files of one are expected"
-        )
+        raise ForeignFileError(paths[0], f"and the others are {names}; files of one are expected")
     files = [content for content, kind in zip(contents, kinds, strict=True) if kind is not None]
     if len(files) not in found[0].files:
         expected = " or ".join(map(str, found[0].files))
         raise ForeignFileError(
             files[-1].path,
-            f"{len(files)} files of cameras",
-            expected=f"{expected} of {found[0].name} are expected",
+            f"{len(files)} files of cameras; {expected} of {found[0].name} are expected",
         )
     rig = found[0].read(files, lens, cameras)
     imus = [content for content, kind in zip(contents, kinds, strict=True) if kind is None]
     if len(imus) > 1:
-        raise ForeignFileError(
-            imus[1].path, "is the second file of an IMU", expected="one is expected"
-        )
+        raise ForeignFileError(imus[1].path, "is the second file of an IMU; one is expected")
     return kalibr.with_imu(rig, imus[0]) if imus else rig
 
 

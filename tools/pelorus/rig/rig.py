@@ -104,8 +104,7 @@ class Rig:
                 self.path,
                 "does not say where the camera sits on the body",
                 expected="a file with T_cam_imu or T_imu_cam is expected (camchain-imucam), or "
-                "--extrinsic "
-                "FILE: JSON with R_CB and t_CB_m, or R_BC and t_BC_m",
+                "--extrinsic FILE: JSON with R_CB and t_CB_m, or R_BC and t_BC_m",
             )
         R = rectification.left.R
         T_CB = Poses(R @ self.T_LB.R, R @ self.T_LB.p)
@@ -132,8 +131,6 @@ class Rig:
 def rigid(path: Path, name: str, matrix: Floats) -> Poses:
     """Returns a 4 x 4 matrix as a pose; its rotation, which files round, is made exact."""
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
-        raise ForeignFileError(
-            path, f"the last row of {name} is {matrix[3]}", expected="0 0 0 1 is expected"
-        )
+        raise ForeignFileError(path, f"the last row of {name} is {matrix[3]}; 0 0 0 1 is expected")
     R = arrays.rotation(path, name, matrix[:3, :3])
     return Poses(se3.nearest_rotation(R), matrix[:3, 3].copy())

@@ -90,9 +90,7 @@ def _asked(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str]) -> tu
         found += of_name
     if len(found) != 2 or found[0] == found[1]:
         raise ForeignFileError(
-            path,
-            f"--cameras {','.join(asked)}",
-            expected="two cameras, parted by a comma, are expected",
+            path, f"--cameras {','.join(asked)}; two cameras, parted by a comma, are expected"
         )
     return found[0], found[1]
 

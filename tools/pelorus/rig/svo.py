@@ -46,9 +46,7 @@ def read(content: Named, asked: Sequence[str] = ()) -> Rig:
     """Reads two cameras: those asked for by label or number, else the stereo pair."""
     listed = content.get("cameras")
     if len(listed) < 2 or not all(isinstance(one, dict) for one in listed):
-        raise ForeignFileError(
-            content.path, f"has {len(listed)} camera", expected="two are expected"
-        )
+        raise ForeignFileError(content.path, f"has {len(listed)} camera; two are expected")
     each = [Named(content.path, one, f"cameras[{k}]") for k, one in enumerate(listed)]
     cameras = [_camera(one, k) for k, one in enumerate(each)]
     return replace(several.rig(content.path, cameras, asked), imu=_imu(content))

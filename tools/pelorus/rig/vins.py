@@ -43,9 +43,7 @@ def read(contents: list[Named]) -> Rig:
         )
     config = configs[0]
     if config.number("num_of_cam") != 2:
-        raise ForeignFileError(
-            config.path, "is not of two cameras", expected="num_of_cam: 2 is expected"
-        )
+        raise ForeignFileError(config.path, "is not of two cameras; num_of_cam: 2 is expected")
     T_B1, T_B2 = (pose(config, f"body_T_{camera}") for camera in CAMERAS)
     T_21 = se3.compose(se3.inverse(T_B2), T_B1)
     has_imu = "imu" not in config or config.number("imu") != 0

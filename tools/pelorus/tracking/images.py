@@ -169,9 +169,7 @@ def _times_in(file: Path, count: int) -> Times:
     seconds = foreign.numbers(file, foreign.rows(file), 1)[:, 0]
     if len(seconds) != count:
         raise ForeignFileError(
-            file,
-            f"has {len(seconds)} times",
-            expected=f"{count} are expected, one for each pair of pictures",
+            file, f"has {len(seconds)} times; {count} are expected, one for each pair of pictures"
         )
     return arrays.nanoseconds(file, "time", seconds)
 
@@ -228,9 +226,7 @@ def in_order(found: Iterable[Pair], bits: int = 16) -> Iterator[tuple[Gray, Gray
 def _require_shape(path: Path, image: Gray, expected: tuple[int, ...], who: str) -> None:
     if image.shape != expected:
         raise ForeignFileError(
-            path,
-            f"has {_size(image.shape)} pixels",
-            expected=f"{_size(expected)} are expected, which {who}",
+            path, f"has {_size(image.shape)} pixels; {_size(expected)} are expected, which {who}"
         )
 
 
@@ -253,9 +249,7 @@ def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> 
 def _require_side(path: Path, shape: tuple[int, ...]) -> None:
     if min(shape) < SIDE_MIN_PX:
         raise ForeignFileError(
-            path,
-            f"has {_size(shape)} pixels",
-            expected=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are expected",
+            path, f"has {_size(shape)} pixels; at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are expected"
         )
 
 
@@ -288,9 +282,7 @@ def unpacked(path: Path, packed: bytes) -> NDArray[np.integer[Any]]:
         pixels = np.asarray(image if wide else image.convert("L"))
     except Exception as error:  # its decoders raise a dozen kinds on damaged files
         raise ForeignFileError(
-            path,
-            f"cannot be read as a picture: {error}",
-            expected="a whole PNG, JPEG or PGM is expected",
+            path, f"cannot be read as a picture: {error}; a whole PNG, JPEG or PGM is expected"
         ) from error
     _require_side(path, pixels.shape)
     return pixels
