@@ -20,9 +20,9 @@ from pelorus.commands.conversion import write
 from pelorus.converters import bag, csv, euroc, kitti, ros, streams, with_pictures
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
+from pelorus.converters.ros_beside import Beside
 from pelorus.converters.ros_frames import Cameras
 from pelorus.converters.ros_motion import MotionTopics, Wheels
-from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
 from pelorus.program.console import out

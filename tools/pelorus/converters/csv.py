@@ -26,7 +26,7 @@ from pelorus.faults.finding import Finding
 from pelorus.io import foreign, trajectory
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.recording import Recording
-from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.io.small_sensors import SMALL_SENSORS, STANDSTILL
 from pelorus.io.table import Table
 from pelorus.io.tracks import Tracks
 from pelorus.io.trajectory import Trajectory
@@ -105,7 +105,7 @@ def read(
     motion = motion_of(sources.motion, columns, timing)
     truth = None if sources.truth is None else truth_of(sources.truth, columns)
     small = _readings(readings, motion, columns)
-    if isinstance(motion, Readings) and not readings.get(wheels.STANDSTILL.name):
+    if isinstance(motion, Readings) and not readings.get(STANDSTILL.name):
         small += wheels.standing(small, columns.remarks)
     if sources.stereo is None:
         frames = _blind(motion, small, columns.remarks)
@@ -206,9 +206,9 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
         otherwise = example(lacking[0], table.names)
         raise ForeignFileError(
             path,
-            f"lacks the column {', '.join(lacking)}",
-            expected=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
-            f"{','.join(there)}. If they are called otherwise: --columns {otherwise}",
+            f"lacks the column {', '.join(lacking)}; there are: {', '.join(table.names)}. If "
+            f"nothing measures them: --measured {','.join(there)}. If they are called otherwise: "
+            f"--columns {otherwise}",
         )
     table.require(*lacking)
     table.leave_out_bad(*(name for short, name in VELOCITIES.items() if short in measured))

@@ -28,10 +28,8 @@ from pelorus.math import motion, se3
 from pelorus.math.inertial import Inertial
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
-from pelorus.rig import kalibr
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
-from pelorus.rig.rig import rigid
 from pelorus.tracking import images
 from pelorus.tracking.images import Pair
 
@@ -104,9 +102,7 @@ def _of_body(folder: Path) -> Poses | None:
     if not path.is_file():
         return None
     content = Named(path, foreign.yaml_object(path))
-    if "T_BS" not in content:
-        return None
-    return rigid(path, "T_BS", kalibr.matrix(content, "T_BS", 4, 4))
+    return content.pose("T_BS") if "T_BS" in content else None
 
 
 def _on_imu(calibrated: Calibrated, body_of_imu: Poses) -> Calibrated:

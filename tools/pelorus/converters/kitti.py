@@ -155,10 +155,8 @@ def _stamp(path: Path, line: int, words: str) -> int:
         seconds = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
         return int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
     except ValueError:
-        expected = "2011-09-30 12:40:25.069324302 or such is expected"
-        raise ForeignFileError(
-            path, f"{words[:40]!r} is no time", at=f"line {line}", expected=expected
-        ) from None
+        what = f"{words[:40]!r} is no time; 2011-09-30 12:40:25.069324302 or such is expected"
+        raise ForeignFileError(path, what, at=f"line {line}") from None
 
 
 # --- odometry -------------------------------------------------------------------------------------
@@ -286,7 +284,7 @@ class _KittiCalib:
     def array(self, name: str, *shape: int) -> Floats:
         if name not in self._lines:
             there = ", ".join(self._lines) or "none"
-            raise ForeignFileError(self.path, f"lacks {name}", expected=f"there are: {there}")
+            raise ForeignFileError(self.path, f"lacks {name}; there are: {there}")
         try:
             numbers = np.array(self._lines[name], np.float64)
         except ValueError:
@@ -294,8 +292,8 @@ class _KittiCalib:
         if numbers.size != int(np.prod(shape)) or not np.isfinite(numbers).all():
             raise ForeignFileError(
                 self.path,
-                f"{name} has {numbers.size} numbers",
-                expected=f"{int(np.prod(shape))} finite ones are expected",
+                f"{name} has {numbers.size} numbers; {int(np.prod(shape))} finite ones are "
+                "expected",
             )
         return numbers.reshape(shape)
 

@@ -75,8 +75,8 @@ def _csv(path: Path) -> MapPoints:
     else:
         raise ForeignFileError(
             path,
-            "says nothing of how certain its landmarks are",
-            expected=f"a column {SIGMA}, or {', '.join(COVARIANCE)}, is expected",
+            f"says nothing of how certain its landmarks are; a column {SIGMA}, or "
+            f"{', '.join(COVARIANCE)}, is expected",
         )
     id = table.integers("id", ID_MAX)
     return MapPoints(id, p, P, np.arange(len(p)) + table.first_row)
@@ -100,8 +100,8 @@ def _check(path: Path, points: MapPoints) -> None:
         rows = points.row[points.id == id]
         raise ForeignFileError(
             path,
-            f"the id {id} stands {len(rows)} times: rows {rows[0]} and {rows[1]}",
-            expected="which one is right cannot be told; one each is expected",
+            f"the id {id} stands {len(rows)} times: rows {rows[0]} and {rows[1]}; which one is "
+            "right cannot be told; one each is expected",
         )
     P = points.covariance
     variances = np.diagonal(P, axis1=1, axis2=2)

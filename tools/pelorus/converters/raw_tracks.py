@@ -24,8 +24,8 @@ def of_pixels(rig: Rig, tracks: Tracks) -> Rig:
     if not holding:
         raise ForeignFileError(
             rig.path,
-            f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
-            expected="the calibration of these pictures is needed",
+            f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution; the "
+            "calibration of these pictures is needed",
         )
     return rig.of_size(*min(holding, key=np.prod))
 
@@ -35,9 +35,7 @@ def require_resolution(where: Path, tracks: Tracks, size: tuple[int, int]) -> No
     words = resolution.beyond(tracks.pixels, size)
     if words:
         raise ForeignFileError(
-            where,
-            words,
-            expected="the calibration of these pictures, or pixels of those, are expected",
+            where, f"{words}; the calibration of these pictures, or pixels of those, are expected"
         )
 
 

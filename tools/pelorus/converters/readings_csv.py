@@ -52,7 +52,7 @@ def read(table: Table, sensor: SmallSensor) -> list[Reading]:
             value[:, k] = _within(table, column, VALUE_MAX)
     if not measured:
         expected = f"some of {', '.join(_wanted(sensor))} are expected"
-        raise ForeignFileError(path, "measures nothing", expected=expected)
+        raise ForeignFileError(path, f"measures nothing; {expected}")
     arm = np.zeros((len(t_ns), 3))
     if sensor.has_arm and any(table.has(name) for name in ARM):
         table.require(*ARM)

@@ -263,9 +263,9 @@ def _require_gravity(readings: Readings) -> None:
     if not FORCES_MPS2[0] <= usual <= FORCES_MPS2[1]:
         raise ForeignFileError(
             readings.where,
-            f"the specific force is {usual:.3g} m/s^2 in the median",
-            expected="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
-            "gravity been taken away? Raw readings are expected",
+            f"the specific force is {usual:.3g} m/s^2 in the median; about 9.81 is expected: is it "
+            "in g (--columns ax=COLUMN:g and so on), or has gravity been taken away? Raw readings "
+            "are expected",
         )
 
 

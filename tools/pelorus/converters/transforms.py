@@ -7,16 +7,18 @@ parent, so two frames are joined by one chain or by none.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy
 
-from pelorus.converters.bag import Bag
 from pelorus.errors import PelorusError
 from pelorus.math import se3
 from pelorus.math.se3 import IDENTITY, Poses
 from pelorus.program.console import progress
+
+if TYPE_CHECKING:
+    from pelorus.converters.bag import Bag
 
 TF = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 STATIC = "tf_static"

@@ -60,8 +60,8 @@ def _cameras(rig: Rig, header: Header) -> tuple[RigMessage, Header]:
     if rig.T_LB is None:
         raise ForeignFileError(
             rig.path,
-            "does not say where the camera sits on the body",
-            expected="--extrinsic FILE is expected: JSON with R_CB and t_CB_m",
+            "does not say where the camera sits on the body; --extrinsic FILE is expected: JSON "
+            "with R_CB and t_CB_m",
         )
     seen = Tracker(rig).calibration(rig.T_LB.R, rig.T_LB.p)
     camera = Camera(seen.fx_px, seen.fy_px, seen.cx_px, seen.cy_px, seen.baseline_m)

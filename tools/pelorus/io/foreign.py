@@ -46,15 +46,14 @@ ArraysByName = dict[str, NDArray[np.generic]]
 
 
 class ForeignFileError(PelorusError):
-    """A file is not what it should be: which one, where in it, what is wrong, what would be right.
-
-    `expected` is a sentence of its own: "12 numbers are expected".
+    """A file is not what it should be: which one, where in it, what is wrong, what would be right:
+    "has 3 numbers; 12 are expected".
     """
 
-    def __init__(self, path: Path, wrong: str, *, at: str = "", expected: str = "") -> None:
-        self.path, self.at, self.wrong, self.expected = path, at, wrong, expected
-        place = f"{path}: {at}" if at else str(path)
-        super().__init__(f"{place}: {wrong}; {expected}" if expected else f"{place}: {wrong}")
+    def __init__(self, path: Path, what: str, *, at: str = "") -> None:
+        self.path, self.at = path, at
+        self.wrong, _, self.expected = what.partition("; ")
+        super().__init__(f"{path}: {at}: {what}" if at else f"{path}: {what}")
 
 
 # --- bytes and text -------------------------------------------------------------------------------
@@ -215,7 +214,7 @@ def _numbers(path: Path, given: list[Row], columns: int | None) -> Floats:
         at = f"line {line}"
         if len(cells) != expected:
             raise ForeignFileError(
-                path, f"has {len(cells)} numbers", at=at, expected=f"{expected} a row are expected"
+                path, f"has {len(cells)} numbers; {expected} a row are expected", at=at
             )
         if not all(map(is_number, cells)):
             raise ForeignFileError(path, "holds something that is no number", at=at)
@@ -253,19 +252,14 @@ def csv_rows(path: Path) -> Csv:
     if not table:
         raise ForeignFileError(path, "the file is empty; a row of column names is expected")
     names, below = table[0], table[1:]
-    by_semicolons = len(names) == 1 and ";" in names[0]
     _, more = _comments(below)
     first_row = skipped + more + 2
     for number, row in enumerate(below[more:], start=first_row):
         if len(row) != len(names):
-            raise ForeignFileError(
-                path,
-                f"has {len(row)} cells, the first row names {len(names)}",
-                at=f"row {number}",
-                expected="points in numbers, and commas between them, are expected"
-                if by_semicolons
-                else "",
-            )
+            wrong = f"has {len(row)} cells, the first row names {len(names)}"
+            if len(names) == 1 and ";" in names[0]:
+                wrong += "; points in numbers, and commas between them, are expected"
+            raise ForeignFileError(path, wrong, at=f"row {number}")
     return Csv(names, below[more:], first_row)
 
 
@@ -418,9 +412,9 @@ def npz(path: Path) -> ArraysByName:
     require_file(path)
     expected = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
     if beginning(path).startswith(NPY_MAGIC):
-        raise ForeignFileError(path, "is a lone array (.npy)", expected=expected)
+        raise ForeignFileError(path, f"is a lone array (.npy); {expected}")
     if not zipfile.is_zipfile(path):
-        raise ForeignFileError(path, "is no .npz file, or its end is missing", expected=expected)
+        raise ForeignFileError(path, f"is no .npz file, or its end is missing; {expected}")
     try:
         _require_unpackable(path)
         with np.load(path, allow_pickle=False) as file:
@@ -437,7 +431,7 @@ def _require_unpackable(path: Path) -> None:
     locked = [member.filename for member in members if member.flag_bits & 1]
     if locked:
         raise ForeignFileError(
-            path, "is encrypted", at=locked[0], expected="a zip without a password is expected"
+            path, "is encrypted; a zip without a password is expected", at=locked[0]
         )
     _require_size(path, sum(member.file_size for member in members))
 
@@ -445,7 +439,7 @@ def _require_unpackable(path: Path) -> None:
 def require_file(path: Path) -> None:
     """Refuses what is no file, an empty one, and one that is too large."""
     if path.is_dir():
-        raise ForeignFileError(path, "is a folder", expected="one file of it is expected")
+        raise ForeignFileError(path, "is a folder; one file of it is expected")
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
     size = path.stat().st_size
@@ -458,8 +452,8 @@ def _require_size(path: Path, size: int) -> None:
     if size > ARRAYS_BYTES_MAX:
         raise ForeignFileError(
             path,
-            f"holds {size} bytes of arrays",
-            expected=f"at most {ARRAYS_BYTES_MAX} are expected: cut the drive into pieces",
+            f"holds {size} bytes of arrays; at most {ARRAYS_BYTES_MAX} are expected: cut the drive "
+            "into pieces",
         )
 
 

@@ -160,8 +160,8 @@ class Table:
                 hint = self.hint_of(lacking[0], self.names)
             raise ForeignFileError(
                 self.path,
-                f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}",
-                expected=f"there are: {there}{hint}",
+                f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}; "
+                f"there are: {there}{hint}",
             )
 
     def numbers(self, *names: str) -> Floats:

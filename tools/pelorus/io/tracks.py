@@ -163,6 +163,6 @@ class Tracks:
         if fullest > OBSERVATIONS_MAX:
             raise ForeignFileError(
                 source,
-                f"a frame has {fullest} observations",
-                expected=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
+                f"a frame has {fullest} observations; at most {OBSERVATIONS_MAX} fit a STEREO "
+                "frame",
             )

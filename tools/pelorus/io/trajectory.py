@@ -128,9 +128,9 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
     if order not in ("xyzw", "wxyz") or max(at.values()) != begin + 3 or begin not in (1, 4):
         raise ForeignFileError(
             path,
-            f"names the columns {', '.join(names[:POSE_COLUMNS])}",
-            expected="time, position and quaternion (x y z w, or w first) are expected, in that "
-            "order or the quaternion before the position",
+            f"names the columns {', '.join(names[:POSE_COLUMNS])}; time, position and quaternion "
+            "(x y z w, or w first) are expected, in that order or the quaternion before the "
+            "position",
         )
     return (1, 4, order) if begin == 4 else (5, 1, order)
 
@@ -179,8 +179,8 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
     if columns < POSE_COLUMNS:
         raise ForeignFileError(
             path,
-            f"rows of {columns} numbers",
-            expected=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
+            f"rows of {columns} numbers; {POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} "
+            "(KITTI) are expected",
         )
     return read_stamped(path)
 

@@ -241,8 +241,8 @@ def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> 
     if known[0] and (shape[1], shape[0]) != known:
         raise ForeignFileError(
             path,
-            f"the pictures have {_size(shape)} pixels",
-            expected=f"{known[0]} x {known[1]} are expected, for which the calibration was made",
+            f"the pictures have {_size(shape)} pixels; {known[0]} x {known[1]} are expected, for "
+            "which the calibration was made",
         )
 
 
