@@ -17,12 +17,8 @@ from rich.markup import escape
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
-from pelorus.converters import bag, csv, euroc, kitti, ros, streams, with_pictures
-from pelorus.converters.bag import Bag
+from pelorus.converters import csv, euroc, kitti, streams
 from pelorus.converters.columns import Columns
-from pelorus.converters.ros_beside import Beside
-from pelorus.converters.ros_frames import Cameras
-from pelorus.converters.ros_motion import MotionTopics, Wheels
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
 from pelorus.program.console import out
@@ -55,8 +51,8 @@ SHARED: dict[str, tuple[Any, Any]] = {
 class StampSource(StrEnum):
     """Times of a bag's messages: of their headers, or of their arrival."""
 
-    HEADER = bag.HEADER
-    LOG = bag.LOG
+    HEADER = "header"
+    LOG = "log"
 
 
 def register(app: typer.Typer) -> None:
@@ -249,35 +245,26 @@ def _ros(
     until: float = typer.Option(math.inf, metavar="S", help="Likewise, what arrived later."),
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
-    joints_alone = _wheels(joint_topic, joints, wheel_radius, track_width)
+    from pelorus.converters import ros  # noqa: PLC0415 - many modules that no other format needs
+    from pelorus.converters.bag import Bag  # noqa: PLC0415
+    from pelorus.converters.ros_beside import Beside  # noqa: PLC0415
+    from pelorus.converters.ros_frames import Cameras  # noqa: PLC0415
+    from pelorus.converters.ros_motion import MotionTopics, Wheels  # noqa: PLC0415
+
+    infos, apart_ns = (left_info_topic, right_info_topic), round(pair_within * 1e6)
+    cameras = Cameras(left_topic, right_topic, tracks_topic, apart_ns, *infos, camera_frame)
+    wheels = None
+    if _are_wheels(joint_topic, joints, wheel_radius, track_width):
+        wheels = Wheels(joint_topic, tuple(joints), wheel_radius, track_width)
     beside = None
-    if wheel_topic or (joints_alone and imu_topic):
+    if wheel_topic or (wheels and imu_topic):
         _require_imu(wheel_topic, twist_topic, joint_topic)
         told = (wheel_sigma, wheel_axes, track_width, wheel_standstill, wheel_slide)
-        beside, joints_alone = Beside(wheel_topic, joints_alone, *told), None
-    topics = ros.Topics(
-        Cameras(
-            left_topic,
-            right_topic,
-            tracks_topic,
-            round(pair_within * 1e6),
-            left_info_topic,
-            right_info_topic,
-            camera_frame,
-        ),
-        MotionTopics(
-            twist_topic,
-            gyro_topic,
-            imu_topic,
-            joints_alone,
-            body_frame,
-            truth_topic,
-            beside is not None,
-        ),
-        position_topic,
-        position_sigma,
-        beside,
+        beside, wheels = Beside(wheel_topic, wheels, *told), None
+    moving = MotionTopics(
+        twist_topic, gyro_topic, imu_topic, wheels, body_frame, truth_topic, beside is not None
     )
+    topics = ros.Topics(cameras, moving, position_topic, position_sigma, beside)
     with Bag(source, stamps.value, (begin, until)) as opened:
         _convert(ros.read(opened, topics, asked), asked, target)
 
@@ -295,21 +282,24 @@ def _require_imu(wheel_topic: str, twist_topic: str, joint_topic: str) -> None:
         )
 
 
-def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> Wheels | None:
+def _are_wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> bool:
+    """Returns whether joints are named; raises PelorusError where more must be known of them."""
     if not topic and not joints:
-        return None
+        return False
     if not topic or not joints or not 0 < radius_m < RADIUS_MAX_M or track_m < 0:
         raise PelorusError(
             "wheels: --joint-topic TOPIC, --joint NAME (once or more) and --wheel-radius M "
             "are expected"
         )
-    return Wheels(topic, tuple(joints), radius_m, track_m)
+    return True
 
 
 def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
     whole = replace(found, remarks=[*asked.remarks, *found.remarks])
     timing = usual if asked.timing is None else asked.timing
     if asked.keep_pictures:
+        from pelorus.converters import with_pictures  # noqa: PLC0415 - it loads the library
+
         for remark in whole.all_remarks:
             out.print(escape(remark))
         made, findings = with_pictures.recording(whole)

@@ -245,17 +245,10 @@ def _readings(
 ) -> list[Reading]:
     """Reads all small sensors."""
     found: list[Reading] = []
-    t_ns = motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
     files = [(sensor, path) for sensor in SMALL_SENSORS for path in paths.get(sensor.name, [])]
     for sensor, path in files:
         own = readings_csv.read(columns.read(path, sensor.name), sensor)
-        first, last = own[0].t_ns, own[-1].t_ns
-        if last < t_ns[0] or t_ns[-1] < first:
-            raise ForeignFileError(
-                path,
-                f"spans {first} to {last} ns, {motion.where} {t_ns[0]} to "
-                f"{t_ns[-1]} ns: they do not overlap",
-            )
+        streams.require_overlap(path, np.array([m.t_ns for m in own], np.int64), motion)
         found += own
     return found
 

@@ -32,9 +32,7 @@ def recording(found: Streams) -> tuple[Recording, list[Finding]]:
     first = next(frames.read())[0]
     height, width = first.shape
     header, rig, message = calibrated.header, calibrated.rig, None
-    sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
-    if (width, height) not in sizes:
-        images.require_size(frames.where[0], first.shape, sizes[0])
+    images.require_size(frames.where[0], first.shape, calibrated.sizes)
     t_ns = frames.t_ns
     if rig is not None:
         t_ns = rig.on_body_clock(t_ns)

@@ -87,18 +87,21 @@ def _position(motion: Motion, arm_m: Floats) -> Floats:
     return p + arm
 
 
-WHEEL = SmallSensor(
-    "wheel", {"x": "vx_mps", "y": "vy_mps", "z": "vz_mps"}, (0.02, 0.02, 0.02), _wheel, usual="x"
+SMALL_SENSORS = WHEEL, STANDSTILL, POSITION = (
+    SmallSensor(
+        "wheel",
+        {"x": "vx_mps", "y": "vy_mps", "z": "vz_mps"},
+        (0.02, 0.02, 0.02),
+        _wheel,
+        usual="x",
+    ),
+    SmallSensor(
+        "standstill",
+        {"v": "v_mps", "w": "w_radps"},
+        (0.002, 0.0005),
+        _nothing,
+        has_arm=False,
+        at_rest=True,
+    ),
+    SmallSensor("position", {"x": "px_m", "y": "py_m", "z": "pz_m"}, (0.05, 0.05, 0.05), _position),
 )
-STANDSTILL = SmallSensor(
-    "standstill",
-    {"v": "v_mps", "w": "w_radps"},
-    (0.002, 0.0005),
-    _nothing,
-    has_arm=False,
-    at_rest=True,
-)
-POSITION = SmallSensor(
-    "position", {"x": "px_m", "y": "py_m", "z": "pz_m"}, (0.05, 0.05, 0.05), _position
-)
-SMALL_SENSORS = (WHEEL, STANDSTILL, POSITION)

@@ -48,6 +48,12 @@ class Calibrated:
     chosen: tuple[str, ...] = ()  # remarks on the choice of cameras
 
     @property
+    def sizes(self) -> list[tuple[int, int]]:
+        """Returns widths and heights of the pictures for which it was made; 0 where unknown."""
+        own = [(self.header.image_width_px, self.header.image_height_px)]
+        return own if self.rig is None else self.rig.sizes
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         return (*self.chosen, *self.imu.remarks)
 

@@ -236,9 +236,10 @@ def require_alike(path: Path, image: Gray, first: Gray) -> None:
     _require_side(path, image.shape)
 
 
-def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> None:
-    """A picture must be as large as its calibration says: (width, height), 0 where it does not."""
-    if known[0] and (shape[1], shape[0]) != known:
+def require_size(path: Path, shape: tuple[int, ...], sizes: Sequence[tuple[int, int]]) -> None:
+    """A picture has one of the sizes that its calibration says: (width, height), 0 if unknown."""
+    known = sizes[0]
+    if known[0] and (shape[1], shape[0]) not in sizes:
         raise ForeignFileError(
             path,
             f"the pictures have {_size(shape)} pixels; {known[0]} x {known[1]} are expected, for "
