@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -37,30 +35,13 @@ app = typer.Typer(
 )
 
 
-def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
-    """Returns the command with an option for each small sensor's file, which it gets by name."""
-    options = [
-        inspect.Parameter(
-            sensor.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=typer.Option([], help=readings_csv.columns_of(sensor)),
-            annotation=list[Path],
-        )
-        for sensor in SMALL_SENSORS
-    ]
-    known = inspect.signature(command, eval_str=True).parameters.values()
-    own = [p for p in known if p.kind is not inspect.Parameter.VAR_KEYWORD]
-    command.__dict__["__signature__"] = inspect.Signature([*own, *options])
-    return command
+SENSORS = {
+    sensor.name: (list[Path], typer.Option([], help=readings_csv.columns_of(sensor)))
+    for sensor in SMALL_SENSORS
+}
 
 
-@app.command(
-    rich_help_panel=OWN_DATA,
-    epilog="Example:  pelorus convert csv --twists twists.csv --stereo stereo.csv "
-    "--calibration camera.json --wheel wheel.csv mine.plr",
-)
-@_with_small_sensors
-def csv(
+def _csv(
     target: Path = own.TARGET,
     twists: Path | None = own.TWISTS,
     gyro: Path | None = own.GYRO,
@@ -107,6 +88,14 @@ def csv(
     )
     found = csv_converter.read(sources, readings, timing)
     importers.converted(found, timing, fix is Fix.AUTO, target)
+
+
+app.command(
+    "csv",
+    rich_help_panel=OWN_DATA,
+    epilog="Example:  pelorus convert csv --twists twists.csv --stereo stereo.csv "
+    "--calibration camera.json --wheel wheel.csv mine.plr",
+)(own.with_options(_csv, SENSORS))
 
 
 @app.command(

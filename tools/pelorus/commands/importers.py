@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import inspect
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -27,7 +25,7 @@ from pelorus.wire.frames import TwistTiming
 
 OWN_DATA = "Your own data"
 RADIUS_MAX_M = 5.0
-# The options of all of them; a command gets their values as its argument `asked`.
+# The options of all of them, of which `_asked` makes what the readers take.
 SHARED: dict[str, tuple[Any, Any]] = {
     "calibration": (list[Path], own.CALIBRATION),
     "extrinsic": (Path | None, own.EXTRINSIC),
@@ -66,23 +64,7 @@ def register(app: typer.Typer) -> None:
             name,
             rich_help_panel=OWN_DATA,
             epilog=f"Example:  pelorus convert {name} {example}",
-        )(_with_shared_options(command))
-
-
-def _with_shared_options(command: Callable[..., None]) -> Callable[..., None]:
-    def run(**given: Any) -> None:
-        shared = {name: given.pop(name) for name in SHARED}
-        command(asked=_asked(**shared), **given)
-
-    parameters = inspect.signature(command, eval_str=True).parameters.values()
-    own_ones = [p.replace(kind=p.KEYWORD_ONLY) for p in parameters if p.name != "asked"]
-    shared = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind)
-        for name, (kind, option) in SHARED.items()
-    ]
-    run.__dict__["__signature__"] = inspect.Signature([*own_ones, *shared])
-    run.__doc__ = command.__doc__
-    return run
+        )(own.with_options(command, SHARED))
 
 
 def _asked(
@@ -131,16 +113,16 @@ def _asked(
 
 
 def _euroc(
-    asked: Asked,
     folder: Path = typer.Argument(..., metavar="FOLDER", help="With mav0/cam0, cam1, imu0."),
     target: Path = own.TARGET,
+    **shared: Any,
 ) -> None:
     """A folder like EuRoC's or TUM-VI's (mav0): pictures, an IMU or your wheels, the truth."""
+    asked = _asked(**shared)
     _convert(euroc.read(folder, asked), asked, target)
 
 
 def _kitti(
-    asked: Asked,
     folder: Path = typer.Argument(
         ..., metavar="FOLDER", help="DATE_drive_NNNN_sync, or sequences/NN of the benchmark."
     ),
@@ -150,15 +132,16 @@ def _kitti(
     ),
     gyro_sigma: float = typer.Option(0.05, metavar="RAD/S", help="Likewise."),
     seed: int = typer.Option(1, help="Of that noise."),
+    **shared: Any,
 ) -> None:
     """A raw drive of KITTI with its OXTS, or a sequence of its odometry benchmark."""
+    asked = _asked(**shared)
     found = kitti.read(folder, asked, kitti.Made(velocity_sigma, gyro_sigma, seed))
     oxts = kitti.is_raw(folder) and asked.motion is None
     _convert(found, asked, target, TwistTiming.END if oxts else None)
 
 
 def _ros(
-    asked: Asked,
     source: Path = typer.Argument(
         ..., metavar="BAG", help="ROS 1 (.bag), ROS 2 (a folder with metadata.yaml), .mcap or .db3."
     ),
@@ -243,6 +226,7 @@ def _ros(
         0.0, "--from", metavar="S", help="Leave out what arrived before, s since the bag began."
     ),
     until: float = typer.Option(math.inf, metavar="S", help="Likewise, what arrived later."),
+    **shared: Any,
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
     from pelorus.converters import ros  # noqa: PLC0415 - many modules that no other format needs
@@ -251,6 +235,7 @@ def _ros(
     from pelorus.converters.ros_frames import Cameras  # noqa: PLC0415
     from pelorus.converters.ros_motion import MotionTopics, Wheels  # noqa: PLC0415
 
+    asked = _asked(**shared)
     infos, apart_ns = (left_info_topic, right_info_topic), round(pair_within * 1e6)
     cameras = Cameras(left_topic, right_topic, tracks_topic, apart_ns, *infos, camera_frame)
     wheels = None

@@ -91,6 +91,10 @@ class Bag(AbstractContextManager["Bag"]):
         """Returns the bag with the topic, as a path for messages to the user."""
         return self.path / topic.lstrip("/")
 
+    def error(self, topic: str, what: str) -> ForeignFileError:
+        """Returns an error in the messages of a topic."""
+        return ForeignFileError(self.path, what, at=topic)
+
     @property
     def types(self) -> dict[str, str]:
         """Returns the message types by topic."""

@@ -16,16 +16,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import scipy
 
 from pelorus.converters import readings_csv, streams, twist_axes, wheels
 from pelorus.converters.columns import Columns, example
 from pelorus.converters.streams import RawTracks, Readings, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
-from pelorus.faults.finding import Finding
 from pelorus.io import foreign, trajectory
 from pelorus.io.foreign import ForeignFileError
-from pelorus.io.recording import Recording
 from pelorus.io.small_sensors import SMALL_SENSORS, STANDSTILL
 from pelorus.io.table import Table
 from pelorus.io.tracks import Tracks
@@ -48,6 +45,7 @@ RATES = {short: name for short, name in VELOCITIES.items() if short[0] == "w"}
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 PIXELS = ("uL_px", "vL_px", "uR_px", "vR_px")
 POSITION, QUATERNION = ("px_m", "py_m", "pz_m"), ("qx", "qy", "qz", "qw")
+NO_ROTATION = "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)"
 NAMES_ITS_COLUMNS = 0.5  # share of the first row's cells with letters, where others have numbers
 
 
@@ -78,19 +76,6 @@ class Sources:
     lens: LensModel | None = None
     cameras: tuple[str, ...] = ()
     columns: Columns = field(default_factory=Columns)
-
-
-def convert(
-    sources: Sources,
-    fix: bool = True,
-    twist_timing: TwistTiming | None = None,
-    readings: Mapping[str, list[Path]] | None = None,
-) -> tuple[Recording, list[Finding]]:
-    """Reads the files; with `fix` also mends the recording and measures its noise.
-
-    `twist_timing` overrides the calibration's. `readings` are the files of small sensors, by name.
-    """
-    return streams.converted(read(sources, readings or {}, twist_timing), twist_timing, fix)
 
 
 def read(
@@ -230,14 +215,8 @@ def _poses_beside(table: Table) -> Poses | None:
     if all(map(table.has, POSITION)):
         p = table.numbers(*POSITION)
     q = table.numbers(*QUATERNION)
-    off = np.abs(np.linalg.norm(q, axis=1) - 1)
-    if off.max() > trajectory.QUATERNION_NORM_TOLERANCE:
-        raise ForeignFileError(
-            table.path,
-            "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
-            at=table.row(int(off.argmax())),
-        )
-    return Poses(np.asarray(scipy.spatial.transform.Rotation.from_quat(q).as_matrix()), p)
+    table.refuse(trajectory.off_unit(q), NO_ROTATION)
+    return Poses.of_quaternions(q, p)
 
 
 def _readings(
@@ -290,12 +269,9 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
     table.leave_out_bad(*QUATERNION, *POSITION)
     t_ns, p = table.ascending_times(), table.numbers(*POSITION)
     q = table.numbers(*QUATERNION)
-    off = np.abs(np.linalg.norm(q, axis=1) - 1) > trajectory.QUATERNION_NORM_TOLERANCE
-    what = "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)"
-    table.remarks += foreign.left_out(path, off, table.row, what)
-    return Trajectory(
-        t_ns[~off], Poses(scipy.spatial.transform.Rotation.from_quat(q[~off]).as_matrix(), p[~off])
-    )
+    off = trajectory.off_unit(q)
+    table.remarks += foreign.left_out(path, off, table.row, NO_ROTATION)
+    return Trajectory(t_ns[~off], Poses.of_quaternions(q[~off], p[~off]))
 
 
 def _names_columns(cells: Sequence[str]) -> bool:

@@ -295,7 +295,7 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
             f"the quaternion's norm is {norms[row]:.4f}; 1 is expected, in the order x y z w",
             at=f"{key} row {row}",
         )
-    return np.asarray(scipy.spatial.transform.Rotation.from_quat(quaternions).as_matrix())
+    return Poses.of_quaternions(quaternions, np.zeros(3)).R
 
 
 # --- the start ------------------------------------------------------------------------------------

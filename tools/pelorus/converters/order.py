@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from pelorus.converters.bag import NS, Bag
 from pelorus.io import arrays, foreign, stamps
-from pelorus.io.foreign import ForeignFileError
 from pelorus.math.motion import Times
 from pelorus.wire.layout import Floats
 
@@ -68,7 +67,7 @@ def leave_out(bag: Bag, topic: str, bad: NDArray[np.bool_], wrong: str, instead:
     """Remarks that the bad messages are left out; refuses too many, and says what to do instead."""
     words = f"{bad.sum()} of {len(bad)} {wrong}"
     if bad.sum() > foreign.BAD_ROWS_MAX * len(bad):
-        raise ForeignFileError(bag.path, words + instead, at=topic)
+        raise bag.error(topic, words + instead)
     if bad.any():
         bag.remarks.append(f"{topic}: {words}: left out")
 
@@ -100,14 +99,13 @@ def in_order(bag: Bag, topic: str, given: Stamps) -> NDArray[np.intp]:
         until, later = (
             t / NS for t in (found.until_ns - bag.begins_ns, found.from_ns - bag.begins_ns)
         )
-        raise ForeignFileError(
-            bag.path,
+        raise bag.error(
+            topic,
             f"stamps go back by {found.by_ns / NS:.4g} s at message {found.message}; was a clock "
             "set back, or are two recordings in one bag? Each must be converted alone: --until "
             f"{math.floor(until * 1e3) / 1e3:.3f} takes the first, --from "
             f"{math.ceil(later * 1e3) / 1e3:.3f} the second; if only the sensor's clock was set, "
             "--stamps log is expected",
-            at=topic,
         )
     behind = np.maximum.accumulate(t_ns) - t_ns
     if behind.any():
@@ -119,11 +117,10 @@ def in_order(bag: Bag, topic: str, given: Stamps) -> NDArray[np.intp]:
     if given.numbers is not None:
         other = len(_without_copies(given)) - len(times)
         if other > foreign.BAD_ROWS_MAX * len(t_ns):
-            raise ForeignFileError(
-                bag.path,
+            raise bag.error(
+                topic,
                 f"{other} of {len(t_ns)} messages have other numbers at the time of the one "
                 "before; a stamp for each reading is expected, or --stamps log",
-                at=topic,
             )
     if len(times) < len(t_ns):
         bag.remarks.append(

@@ -18,7 +18,6 @@ from pelorus.converters.ros_motion import TWISTS, Wheels, of_joints, rows_of, xy
 from pelorus.converters.streams import BLIND_VELOCITY_MPS
 from pelorus.converters.wheels import Rolling
 from pelorus.errors import PelorusError
-from pelorus.io.foreign import ForeignFileError
 from pelorus.io.small_sensors import POSITION, WHEEL
 from pelorus.math.se3 import IDENTITY, Poses
 from pelorus.wire.frames import Reading
@@ -50,16 +49,14 @@ def positions(bag: Bag, topic: str, sigma_m: float, body: str) -> list[Reading]:
     t_ns, numbers, frame = rows_of(bag, topic, row)
     fixed = numbers[:, 0] > 0
     if not fixed.any():
-        raise ForeignFileError(bag.path, f"none of {len(fixed)} messages has a fix", at=topic)
+        raise bag.error(topic, f"none of {len(fixed)} messages has a fix")
     if not fixed.all():
         bag.remarks.append(f"{topic}: {int((~fixed).sum())} of {len(fixed)} messages have no fix")
     t_ns, places, sigmas = t_ns[fixed], numbers[fixed, 1:4], numbers[fixed, 4:]
     if sigma_m > 0:
         sigmas = np.full_like(sigmas, sigma_m)
     if not sigmas.all():
-        raise ForeignFileError(
-            bag.path, "messages tell no covariance; --position-sigma M is expected", at=topic
-        )
+        raise bag.error(topic, "messages tell no covariance; --position-sigma M is expected")
     local = Ground().local(bag.where(topic), places, bag.remarks)
     if not bag.tree.knows(frame, body):
         bag.remarks.append(f"{topic}: the antenna is taken as sitting at the body's origin")
@@ -158,10 +155,9 @@ def _of_topic(bag: Bag, beside: Beside) -> tuple[Rolling, Floats, str]:
 
 def _sigma_wanted(bag: Bag, topic: str, beside: Beside) -> float:
     if not beside.sigma_mps:
-        raise ForeignFileError(
-            bag.path,
+        raise bag.error(
+            topic,
             "messages tell no covariance; --wheel-sigma M/S is expected: how far a speed is off, "
             "slip apart; 0.05 for many wheels",
-            at=topic,
         )
     return beside.sigma_mps

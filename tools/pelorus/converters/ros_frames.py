@@ -150,30 +150,18 @@ def _pictures(bag: Bag, cameras: Cameras) -> Pictures:
         if deep is not None:
             brightest = max(brightest or 0, int(deep.max(initial=0)))
     bits = 16 if brightest is None else images.bits_up_to(brightest, bag.path, bag.remarks)
-    left, right = (_times(bag, topic, stamps[topic]) for topic in topics)
+    left, right = (
+        np.array(stamps[topic], np.int64)[_chosen(bag, topic, stamps[topic]), 0] for topic in topics
+    )
     pairs = _paired(bag, cameras, left, right)
-    bag.remarks += apart_words(pairs)
-    alone = len(left) + len(right) - 2 * len(pairs)
-    if alone:
-        bag.remarks.append(f"{alone} pictures have no partner and are left out")
     where = bag.where(cameras.left), bag.where(cameras.right)
-
-    def pixels() -> Iterator[tuple[Gray, Gray]]:
-        return _in_pairs(bag, cameras, pairs, bits)
-
-    return Pictures(where, pairs[:, 0], pixels)
-
-
-def _times(bag: Bag, topic: str, stamps: list[tuple[int, int]]) -> Times:
-    """Returns the times of the pictures that have one, in order."""
-    t_ns: Times = np.array([t for t, _ in stamps], np.int64)
-    return t_ns[_chosen(bag, topic, stamps)]
+    return Pictures(where, pairs[:, 0], lambda: _in_pairs(bag, cameras, pairs, bits))
 
 
 def _chosen(bag: Bag, topic: str, stamps: list[tuple[int, int]]) -> NDArray[np.intp]:
     """Returns the messages that have a time, in its order, by stamps and arrivals."""
     if not stamps:
-        raise ForeignFileError(bag.path, "no message can be read", at=topic)
+        raise bag.error(topic, "no message can be read")
     t_ns, arrival_ns = np.array(stamps, np.int64).T
     good = np.nonzero(sound(bag, topic, t_ns, np.zeros((len(t_ns), 0))))[0]
     return good[in_order(bag, topic, Stamps(t_ns, arrival_ns).at(good))]
@@ -195,17 +183,19 @@ def _of_16_bits(bag: Bag, topic: str, message: Any, count: int) -> NDArray[Any] 
 
 def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
     """Returns (n, 2) times: two pictures of which each is the nearest to the other."""
-    pairs = images.together(left, right, cameras.apart_ns)
-    alone = len(left) + len(right) - 2 * len(pairs)
-    if images.too_many_alone(len(pairs), alone) or len(pairs) < images.PAIRS_MIN:
+    found = images.together(left, right, cameras.apart_ns)
+    count = len(found.pairs)
+    if images.too_many_alone(count, found.alone) or count < images.PAIRS_MIN:
         apart_ms = np.median(np.abs(right[motion.nearest(right, left)] - left)) * 1e-6
         raise PelorusError(
-            f"{bag.path}: of {len(left)} pictures of {cameras.left} {len(pairs)} have one of "
+            f"{bag.path}: of {len(left)} pictures of {cameras.left} {count} have one of "
             f"the {len(right)} of {cameras.right} within {cameras.apart_ns * 1e-6:g} ms (median "
             f"{apart_ms:.3g} ms); cameras that are triggered together are expected, or "
             "--pair-within MS"
         )
-    return np.stack((left[pairs[:, 0]], right[pairs[:, 1]]), axis=-1)
+    pairs = np.stack((left[found.pairs[:, 0]], right[found.pairs[:, 1]]), axis=-1)
+    bag.remarks += [*apart_words(pairs), *found.remarks]
+    return pairs
 
 
 def apart_words(pairs: Times) -> list[str]:
@@ -303,7 +293,7 @@ def _tracks(bag: Bag, topic: str, calibrated: Calibrated) -> RawTracks:
     tracks = Tracks.from_rows(len(times), frame, table[:, 0].astype(np.int64), table[:, 1:])
     tracks.check(bag.path)
     if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
-        raise ForeignFileError(bag.path, "an id stands twice in a message", at=topic)
+        raise bag.error(topic, "an id stands twice in a message")
     return RawTracks(where, times, tracks)
 
 

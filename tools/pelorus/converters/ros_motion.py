@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy
 
 from pelorus.converters import streams, twist_axes
 from pelorus.converters.bag import Bag
@@ -17,7 +16,7 @@ from pelorus.converters.streams import Asked, Readings, Twists
 from pelorus.converters.transforms import bare
 from pelorus.errors import PelorusError
 from pelorus.io.foreign import ForeignFileError
-from pelorus.io.trajectory import QUATERNION_NORM_TOLERANCE, Trajectory
+from pelorus.io.trajectory import Trajectory, off_unit
 from pelorus.math.inertial import Inertial
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
@@ -87,7 +86,7 @@ def read(bag: Bag, topics: MotionTopics, asked: Asked) -> Twists | Readings:
         return found
     rows = _halves(bag, topics.gyro)
     if not rows.numbers[:, 3:].any():
-        raise ForeignFileError(bag.path, "all its rates of turn are 0", at=topics.gyro)
+        raise bag.error(topics.gyro, "all its rates of turn are 0")
     w_B = rows.numbers[:, 3:]
     if rows.frame and found.frame and rows.frame != found.frame:
         w_B = _turned(bag, w_B, topics.gyro, rows.frame, found.frame)
@@ -164,8 +163,8 @@ def _twists(bag: Bag, topic: str, asked: Asked) -> Twists:
         f"{topic}: twists of the frame {frame!r}: the calibration's extrinsic must be of the same"
     )
     poses = None
-    if of_pose is not None and _are_rotations(numbers[:, 9:]):
-        poses = _poses(numbers[:, 6:])
+    if of_pose is not None and not off_unit(numbers[:, 9:]).any():
+        poses = Poses.of_quaternions(numbers[:, 9:], numbers[:, 6:9])
     return twist_axes.in_body(found, poses, asked.axes, _timing(asked), bag.remarks)
 
 
@@ -217,11 +216,10 @@ def _imu(bag: Bag, topic: str, gyro: str) -> Readings:
         if w and second.numbers[:, :3].any():
             return _joined(bag, others[0], topic, second, rows)
     what = "specific forces" if w else "rates of turn"
-    raise ForeignFileError(
-        bag.path,
+    raise bag.error(
+        topic,
         f"all its {what} are 0; are they on another topic? --imu-topic of the accelerometer and "
         f"--gyro-topic of the gyro are expected; {bag.listing()}",
-        at=topic,
     )
 
 
@@ -240,9 +238,9 @@ def _joined(bag: Bag, accel: str, gyro: str, a: Rows, w: Rows) -> Readings:
     """Joins both; the slower one is interpolated to the times of the faster one."""
     forces, rates = (a.t_ns, a.numbers[:, :3]), (w.t_ns, w.numbers[:, 3:])
     if not forces[1].any():
-        raise ForeignFileError(bag.path, "all its specific forces are 0", at=accel)
+        raise bag.error(accel, "all its specific forces are 0")
     if not rates[1].any():
-        raise ForeignFileError(bag.path, "all its rates of turn are 0", at=gyro)
+        raise bag.error(gyro, "all its rates of turn are 0")
     if a.frame and w.frame and a.frame != w.frame:
         bag.remarks.append(f"{accel}, {gyro}: of {a.frame!r} and {w.frame!r}: taken as one frame")
     where = bag.where(accel)
@@ -275,26 +273,15 @@ def truth(bag: Bag, topic: str) -> Trajectory:
     bag.require(topic, *POSES)
     of_message = POSES[bag.types[topic]]
     t_ns, numbers, _ = rows_of(bag, topic, lambda message: _pose(of_message(message)))
-    if not _are_rotations(numbers[:, 3:]):
-        raise ForeignFileError(bag.path, "holds a quaternion whose norm is not 1", at=topic)
-    return Trajectory(t_ns, _poses(numbers))
+    if off_unit(numbers[:, 3:]).any():
+        raise bag.error(topic, "holds a quaternion whose norm is not 1")
+    return Trajectory(t_ns, Poses.of_quaternions(numbers[:, 3:], numbers[:, :3]))
 
 
 def _pose(pose: tuple[Any, Any]) -> list[float]:
     """Returns p and q, x y z w."""
     p, q = pose
     return [*xyz(p), *xyz(q), float(q.w)]
-
-
-def _poses(numbers: Floats) -> Poses:
-    return Poses(
-        scipy.spatial.transform.Rotation.from_quat(numbers[:, 3:]).as_matrix(), numbers[:, :3]
-    )
-
-
-def _are_rotations(quaternions: Floats) -> bool:
-    norms = np.linalg.norm(quaternions, axis=1)
-    return bool(np.abs(norms - 1).max() <= QUATERNION_NORM_TOLERANCE)
 
 
 # --- rows -----------------------------------------------------------------------------------------
@@ -313,7 +300,7 @@ def rows_of(bag: Bag, topic: str, row: Callable[[Any], list[float]]) -> Rows:
         frame = bare(getattr(one.message, "child_frame_id", "") or one.message.header.frame_id)
         stamped.append((one.t_ns, one.arrival_ns, row(one.message)))
     if not stamped:
-        raise ForeignFileError(bag.path, "no message can be read", at=topic)
+        raise bag.error(topic, "no message can be read")
     t_ns, arrival_ns = np.array([times for *times, _ in stamped], np.int64).T
     numbers = np.array([values for *_, values in stamped])
     good = sound(bag, topic, t_ns, numbers)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import scipy
 
 from pelorus.errors import PelorusError
 from pelorus.math import se3
@@ -86,9 +85,7 @@ class Tree:
         norm = np.linalg.norm(quaternion)
         if child == parent or not np.isfinite(p).all() or not 0.9 < norm < 1.1:
             return
-        link = FrameLink(
-            parent, Poses(scipy.spatial.transform.Rotation.from_quat(quaternion).as_matrix(), p)
-        )
+        link = FrameLink(parent, Poses.of_quaternions(quaternion, p))
         known = self.links.setdefault(child, link)
         if known.parent == parent and _same(known.T, link.T):
             return

@@ -97,12 +97,11 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
     q = sound.numbers[:, q_at : q_at + 4]
     q = np.roll(q, -1, axis=1) if order == "wxyz" else q
     once, repeats = ascending(path, sound.rows, t_ns)
-    turned, turnless = _turned(path, sound.rows, q)
-    good = once & turned
-    poses = Poses(
-        scipy.spatial.transform.Rotation.from_quat(q[good]).as_matrix(),
-        sound.numbers[good, p_at : p_at + 3],
-    )
+    wrong = off_unit(q)
+    what = "the quaternion's norm is not 1"
+    turnless = foreign.left_out(path, wrong, lambda k: f"line {sound.rows[k].line}", what)
+    good = once & ~wrong
+    poses = Poses.of_quaternions(q[good], sound.numbers[good, p_at : p_at + 3])
     return Trajectory(t_ns[good], poses, (*remarks, *repeats, *turnless))
 
 
@@ -156,11 +155,9 @@ def ascending(
     return ~(unset | again), remarks
 
 
-def _turned(path: Path, rows: list[Row], q: Floats) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Returns which quaternions are rotations, and remarks on the other rows."""
-    wrong = np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1) > QUATERNION_NORM_TOLERANCE, np.bool_)
-    what = "the quaternion's norm is not 1"
-    return ~wrong, foreign.left_out(path, wrong, lambda k: f"line {rows[k].line}", what)
+def off_unit(q: Floats) -> NDArray[np.bool_]:
+    """Returns which quaternions (n, 4) are no rotations."""
+    return np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1) > QUATERNION_NORM_TOLERANCE, np.bool_)
 
 
 def read_truth(path: Path, times: Path | None = None, recording: Path | None = None) -> Trajectory:

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
@@ -115,7 +114,7 @@ def _basalt_pose(one: Named) -> Poses:
     q = np.array([one.number(f"q{axis}") for axis in "xyzw"])
     if abs(np.linalg.norm(q) - 1) > 1e-2:
         raise ForeignFileError(one.path, "the quaternion's norm is not 1", at=one.at)
-    return Poses(scipy.spatial.transform.Rotation.from_quat(q).as_matrix(), p)
+    return Poses.of_quaternions(q, p)
 
 
 def _basalt_lens(camera: Named, size: list[int]) -> Lens:

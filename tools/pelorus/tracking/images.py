@@ -55,8 +55,8 @@ def pairs(left: Path, right: Path, remarks: list[str] | None = None) -> list[Pai
     if remarks is None or too_many_alone(len(lefts.keys() & rights.keys()), len(alone)):
         _require_partners(left, lefts, right, rights)
         _require_partners(right, rights, left, lefts)
-    elif alone:
-        remarks.append(f"{len(alone)} pictures have no partner and are left out")
+    else:
+        remarks += _left_out(len(alone))
         lefts = {name: path for name, path in lefts.items() if name in rights}
     if len(lefts) < PAIRS_MIN:
         raise PelorusError(
@@ -106,15 +106,30 @@ def is_whole(path: Path) -> bool:
     return bool(end) and (path.suffix.lower() != ".png" or b"IEND" in end)
 
 
-def together(left_ns: Times, right_ns: Times, apart_ns: int) -> NDArray[np.intp]:
-    """(n, 2) indices of pictures that are each other's nearest in time, and near enough."""
-    if not len(left_ns) or not len(right_ns):
-        return np.empty((0, 2), np.intp)
-    left = np.arange(len(left_ns))
-    right = motion.nearest(right_ns, left_ns)
-    mutual = motion.nearest(left_ns, right_ns)[right] == left
-    near = np.abs(right_ns[right] - left_ns) <= apart_ns
-    return np.asarray(np.stack((left, right), axis=-1)[mutual & near], np.intp)
+class Together(NamedTuple):
+    """Indices (n, 2) of pictures that were taken together, and how many have no partner."""
+
+    pairs: NDArray[np.intp]
+    alone: int
+
+    @property
+    def remarks(self) -> list[str]:
+        return _left_out(self.alone)
+
+
+def together(left_ns: Times, right_ns: Times, apart_ns: int) -> Together:
+    """Returns pictures that are each other's nearest in time, and near enough."""
+    pairs = np.empty((0, 2), np.intp)
+    if len(left_ns) and len(right_ns):
+        left, right = np.arange(len(left_ns)), motion.nearest(right_ns, left_ns)
+        mutual = motion.nearest(left_ns, right_ns)[right] == left
+        near = np.abs(right_ns[right] - left_ns) <= apart_ns
+        pairs = np.asarray(np.stack((left, right), axis=-1)[mutual & near], np.intp)
+    return Together(pairs, len(left_ns) + len(right_ns) - 2 * len(pairs))
+
+
+def _left_out(alone: int) -> list[str]:
+    return [f"{alone} pictures have no partner and are left out"] if alone else []
 
 
 def too_many_alone(pairs: int, alone: int) -> bool:
