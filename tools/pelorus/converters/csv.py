@@ -244,9 +244,7 @@ def _stereo(table: Table) -> tuple[Times, Tracks]:
     pixels = table.numbers(*PIXELS)
     tracks = Tracks.from_rows(len(frame_t_ns), frame.reshape(-1).astype(np.intp), id, pixels)
     tracks.check(path)
-    twice = (np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)
-    if twice.any():
-        k = int(np.nonzero(twice)[0][0])
+    if (k := tracks.twice()) is not None:
         t_ns = frame_t_ns[tracks.frame[k]]
         rows = table.rows[(row_t_ns == t_ns) & (id == tracks.id[k])]
         raise ForeignFileError(

@@ -34,6 +34,7 @@ from pelorus.math.axes import body_axes
 from pelorus.math.inertial import Inertial, MotionState
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
+from pelorus.rig.lens import intrinsics
 from pelorus.wire.frames import (
     Header,
     Noise,
@@ -256,12 +257,10 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
     tracks = Tracks.from_rows(
         len(t_ns), frame, id.astype(np.int64), file.get("stereo_px", shape=(count, 4))
     )
-    twice = np.nonzero((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0))[0]
-    if len(twice):
-        k = twice[0]
+    if (k := tracks.twice()) is not None:
+        seconds_of = t_ns[tracks.frame[k]] * 1e-9
         raise ForeignFileError(
-            path,
-            f"id {tracks.id[k]} stands twice in the frame of {t_ns[tracks.frame[k]] * 1e-9:.6f} s",
+            path, f"id {tracks.id[k]} stands twice in the frame of {seconds_of:.6f} s"
         )
     return t_ns, tracks
 
@@ -346,20 +345,18 @@ NOISES = {  # by name in a HEADER, the name in calib
 
 class _Calib(Named):
     def header(self, name: str) -> Header:
-        fx, fy, cx, cy, baseline = (
-            self.number(key) for key in ("fx", "fy", "cx", "cy", "baseline_m")
-        )
+        four, baseline = intrinsics(self, "fx", "fy", "cx", "cy"), self.number("baseline_m")
         T_CB = se3.inverse(self._extrinsic(baseline))
-        if self._number_or_0("cam_imu_time_offset_s"):
+        if self.number("cam_imu_time_offset_s", 0.0):
             raise self._wrong("cam_imu_time_offset_s", "0 is expected: times on one clock")
         return Header(
-            arrays.camera_of(self.path, fx, fy, cx, cy, baseline),
+            arrays.camera_of(self.path, *four, baseline),
             T_CB.R,
             T_CB.p,
             body_axes=body_axes(T_CB.R),
             twist_timing=TwistTiming.MID,
-            image_width_px=int(self._number_or_0("width")),
-            image_height_px=int(self._number_or_0("height")),
+            image_width_px=int(self.number("width", 0.0)),
+            image_height_px=int(self.number("height", 0.0)),
             noise=Noise(gravity=self._gravity(), **self._noises()),
             name=header_name(name),
             process=Process.IMU,
@@ -367,9 +364,6 @@ class _Calib(Named):
 
     def _wrong(self, key: str, expected: str) -> ForeignFileError:
         return self.error(key, self.get(key), expected)
-
-    def _number_or_0(self, key: str) -> float:
-        return self.number(key) if key in self else 0.0
 
     def _pose(self, key: str) -> Poses:
         matrix = self.array(key, 4, 4)

@@ -292,7 +292,7 @@ def _tracks(bag: Bag, topic: str, calibrated: Calibrated) -> RawTracks:
     table, times = table[~broken], np.array(stamps, np.int64)[order, 0]
     tracks = Tracks.from_rows(len(times), frame, table[:, 0].astype(np.int64), table[:, 1:])
     tracks.check(bag.path)
-    if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
+    if tracks.twice() is not None:
         raise bag.error(topic, "an id stands twice in a message")
     return RawTracks(where, times, tracks)
 
