@@ -62,7 +62,8 @@ def is_own(paths: Sequence[Path]) -> bool:
     """Returns whether this is the project's own JSON, of a rectified pair."""
     if len(paths) != 1 or paths[0].suffix.lower() != ".json":
         return False
-    return _format_of(_content(paths[0])) is None
+    content = _content(paths[0])
+    return "fx_px" in content or _format_of(content) is None
 
 
 def read(

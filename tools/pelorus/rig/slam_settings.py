@@ -135,14 +135,15 @@ def vins(contents: list[Named]) -> Rig:
     config = configs[0]
     if config.number("num_of_cam") != 2:
         raise ForeignFileError(config.path, "is not of two cameras; num_of_cam: 2 is expected")
-    T_1B, T_2B = (se3.inverse(config.pose(f"body_T_{camera}")) for camera in VINS_CAMERAS)
+    T_B1, T_B2 = (config.pose(f"body_T_{camera}") for camera in VINS_CAMERAS)
     left, right = (
         _vins_lens(_vins_camera(config, contents, f"{camera}_calib")) for camera in VINS_CAMERAS
     )
     has_imu = config.number("imu", 1.0) != 0
     topics = [str(config.get(f"image{k}_topic")) for k in (0, 1) if f"image{k}_topic" in config]
-    T_21 = se3.compose(T_2B, se3.inverse(T_1B))
-    rig = Rig.of_cameras(config.path, left, right, T_21, T_1B if has_imu else None, topics)
+    T_1B = se3.inverse(T_B1) if has_imu else None
+    T_21 = se3.compose(se3.inverse(T_B2), T_B1)
+    rig = Rig.of_cameras(config.path, left, right, T_21, T_1B, topics)
     told = ", ".join(name for name in VINS_NOISE if name in config)
     remark = f"{config.path}: {told} are sigmas of single readings: not used"
     imu = ImuModel(remarks=(remark,) if has_imu and told else ())
