@@ -15,6 +15,8 @@ import pytest
 from converted import SHORT, Run, messages_of
 from drives import clean, with_turned_axes
 from pelorus.converters import csv as csv_converter
+from pelorus.converters.streams import converted
+from pelorus.faults.finding import Finding
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import project, triangulate
 from pelorus.math import se3
@@ -81,6 +83,11 @@ def refusal_of_twists(folder: Path, pelorus: Run, change: tuple[str, str]) -> st
     return said
 
 
+def convert(sources: csv_converter.Sources, fix: bool = True) -> tuple[Recording, list[Finding]]:
+    """What `convert csv` makes of these files."""
+    return converted(csv_converter.read(sources, {}), None, fix)
+
+
 def sources_in(folder: Path) -> csv_converter.Sources:
     """Returns the files that `csv_files` wrote."""
     return csv_converter.Sources(
@@ -119,13 +126,13 @@ def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
 ) -> None:
     csv_files(tmp_path, clean(3, velocity_sigma_mps=0.5, gyro_sigma_radps=0.05))
     sources = sources_in(tmp_path)
-    recording, findings = csv_converter.convert(sources)
+    recording, findings = convert(sources)
     noise = next(finding for finding in findings if finding.subject == "twist noise")
     assert noise.measured
     assert recording.header.noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
     assert recording.header.noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
     assert recording.header.noise.pixel_sigma_px == 0.5, "as the calibration says"
-    recording, findings = csv_converter.convert(sources, fix=False)
+    recording, findings = convert(sources, fix=False)
     assert findings == []
     assert recording.header.noise.velocity_sigma_mps < 0
 
@@ -134,13 +141,13 @@ def test_faults_of_a_users_own_data_are_found_too(tmp_path: Path) -> None:
     drive = clean(3)
     csv_files(tmp_path, with_turned_axes(drive))
     sources = sources_in(tmp_path)
-    mended, findings = csv_converter.convert(sources)
+    mended, findings = convert(sources)
     assert [f.subject for f in findings if f.found] == ["body axes", "clock"], (
         "the calibration says end where the drive was made with start"
     )
     assert "twist-timing start" in findings[-1].evidence
     assert np.allclose(mended.T_CB.R, drive.T_CB.R)
-    left, findings = csv_converter.convert(sources, fix=False)
+    left, findings = convert(sources, fix=False)
     assert findings == []
     assert np.allclose(left.T_CB.R, with_turned_axes(drive).T_CB.R)
 
@@ -148,7 +155,7 @@ def test_faults_of_a_users_own_data_are_found_too(tmp_path: Path) -> None:
 def test_no_extrinsic_is_changed_for_one_that_does_not_fit_either(tmp_path: Path) -> None:
     turned = with_turned_axes(clean(3))
     csv_files(tmp_path, replace(turned, v_B_mps=3.6 * turned.v_B_mps))
-    left, findings = csv_converter.convert(sources_in(tmp_path))
+    left, findings = convert(sources_in(tmp_path))
     assert np.allclose(left.T_CB.R, turned.T_CB.R)
     told = {finding.subject: finding for finding in findings}
     assert told["body axes"].action.startswith("left as given")

@@ -95,12 +95,12 @@ def set_back(
 
 def judged(t_ns: NDArray[np.int64], numbers: Floats | None = None) -> list[str]:
     """The remarks on these stamps; the bag is only named."""
-    bag, remarks = Bag.__new__(Bag), list[str]()
-    bag.path = Path("bag")
+    bag = Bag.__new__(Bag)
+    bag.path, bag.remarks = Path("bag"), list[str]()
     bag.begins_ns = 0
-    kept = order.in_order(bag, "/x", order.Stamps(t_ns, t_ns, numbers), remarks)
+    kept = order.in_order(bag, "/x", order.Stamps(t_ns, t_ns, numbers))
     assert (np.diff(t_ns[kept]) > 0).all()
-    return remarks
+    return bag.remarks
 
 
 @pytest.mark.parametrize("by_sorting", [False, True])
@@ -175,16 +175,16 @@ def test_an_imu_whose_clock_was_set_back_is_refused_whatever_the_bag(
 
 
 def test_a_stamp_that_was_never_set_is_left_out_and_one_that_begins_a_clock_is_kept() -> None:
-    bag, remarks = Bag.__new__(Bag), list[str]()
-    bag.path = Path("bag")
+    bag = Bag.__new__(Bag)
+    bag.path, bag.remarks = Path("bag"), list[str]()
     nothing = np.zeros((100, 0))
     today = 1_700_000_000 * NS + np.arange(100) * 5_000_000
     today[:3] = 0
-    assert order.sound(bag, "/x", today, nothing, remarks).sum() == 97
-    assert remarks == ["/x: 3 of 100 headers have no time: left out"]
-    assert order.sound(bag, "/x", np.arange(100) * 5_000_000, nothing, remarks).all()
+    assert order.sound(bag, "/x", today, nothing).sum() == 97
+    assert bag.remarks == ["/x: 3 of 100 headers have no time: left out"]
+    assert order.sound(bag, "/x", np.arange(100) * 5_000_000, nothing).all()
     with pytest.raises(Exception, match="100 of 100 headers have no time; times in header"):
-        order.sound(bag, "/x", np.zeros(100, np.int64), nothing, remarks)
+        order.sound(bag, "/x", np.zeros(100, np.int64), nothing)
 
 
 def test_bad_messages_are_left_out_and_counted_and_many_are_refused(
@@ -221,14 +221,15 @@ def test_a_lost_picture_leaves_its_partner_out_however_wide_the_pairing(
             t_ns = NS + k * 50_000_000 + 9_000_000
             recorder.image("/right", t_ns, np.full((64, 80), 100 + k, np.uint8))
     with Bag(written(recorder, tmp_path, "mcap")) as bag:
-        remarks: list[str] = []
         cameras = ros_frames.Cameras("/left", "/right", apart_ns=130_000_000)
         calibrated: Any = None
-        pictures: Any = ros_frames.read(bag, cameras, calibrated, remarks)
+        pictures: Any = ros_frames.read(bag, cameras, calibrated)
         shown = [(int(left[0, 0]), int(right[0, 0]) - 100) for left, right in pictures.read()]
     assert shown == [(k, k) for k in range(40) if k not in lost]
-    assert remarks[-1:] == ["3 pictures have no partner and are left out"]
-    assert [remark.startswith("left and right pictures are 9 ms apart") for remark in remarks] == [
+    assert bag.remarks[-1:] == ["3 pictures have no partner and are left out"]
+    assert [
+        remark.startswith("left and right pictures are 9 ms apart") for remark in bag.remarks
+    ] == [
         True,
         False,
     ]
@@ -251,15 +252,12 @@ def test_pictures_of_16_bits_are_scaled_by_the_bits_that_all_of_them_use(
             recorder.image(topic, NS + k * 50_000_000, grey.astype(packing), "mono16")
             recorder.found[-1][3].is_bigendian = int(packing == ">u2")
     with Bag(written(recorder, tmp_path, "mcap")) as bag:
-        remarks: list[str] = []
         calibrated: Any = None
-        pictures: Any = ros_frames.read(
-            bag, ros_frames.Cameras("/left", "/right"), calibrated, remarks
-        )
+        pictures: Any = ros_frames.read(bag, ros_frames.Cameras("/left", "/right"), calibrated)
         brightest = [int(left.max()) for left, _ in pictures.read()]
     assert brightest == [(top * (k + 1) // 4) >> (bits - 8) for k in range(4)]
     told = f"pictures of 16 bits hold {bits} (the brightest pixel is {top} of 65535)"
-    assert [remark.partition(": ")[2] for remark in remarks] == ([told] if bits < 16 else [])
+    assert [remark.partition(": ")[2] for remark in bag.remarks] == ([told] if bits < 16 else [])
 
 
 # --- gyro and accelerometer apart -----------------------------------------------------------------

@@ -13,8 +13,9 @@ from bags import Recorder
 from converted import Run, messages_of
 from draws import draws
 from pelorus.converters import wheels
-from pelorus.converters.wheels import STANDSTILL, WHEEL, Rolling
+from pelorus.converters.wheels import Rolling
 from pelorus.io.recording import Recording
+from pelorus.io.small_sensors import STANDSTILL, WHEEL
 from pelorus.io.tracks import Tracks
 from pelorus.math import se3
 from pelorus.math.se3 import Poses

@@ -90,7 +90,7 @@ def _extrinsic(file: Arrays) -> Poses:
     matrix = file.get(key, shape=(4, 4))
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise ForeignFileError(
-            file.path, f"the last row of {key} is {matrix[3]}", expected="0 0 0 1 is expected"
+            file.path, f"the last row of {key} is {matrix[3]}; 0 0 0 1 is expected"
         )
     T = Poses(arrays.rotation(file.path, key, matrix[:3, :3]), matrix[:3, 3])
     return T if key == "cam_T_imu" else se3.inverse(T)
@@ -102,9 +102,7 @@ def with_truth(recording: Recording, path: Path) -> Recording:
     frames = len(recording.frame_t_ns)
     if len(poses.p) > frames:
         raise ForeignFileError(
-            path,
-            f"{len(poses.p)} poses for {frames} frames",
-            expected="at most one each is expected",
+            path, f"{len(poses.p)} poses for {frames} frames; at most one each is expected"
         )
     body = trajectory.body_poses(poses, recording.T_CB)
     return recording.with_truth(recording.frame_t_ns[: len(poses.p)], body)

@@ -17,9 +17,7 @@ def mat(path: Path) -> ArraysByName:
     foreign.require_file(path)
     packed = foreign.content(path, foreign.ARRAYS_BYTES_MAX)
     if matfile.is_hdf5(packed):
-        raise ForeignFileError(
-            path, "is a MATLAB 7.3 file (HDF5)", expected="save it with -v7 to convert it"
-        )
+        raise ForeignFileError(path, "is a MATLAB 7.3 file (HDF5); save it with -v7 to convert it")
     try:
         return matfile.arrays(packed, foreign.ARRAYS_BYTES_MAX)
     except matfile.BrokenMatFile as error:

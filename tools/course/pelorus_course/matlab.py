@@ -104,8 +104,8 @@ def _features(file: Arrays, count: int) -> Floats:
         return y
     raise ForeignFileError(
         file.path,
-        f"y_k_j has the shape {y.shape}, but t has {count} times",
-        expected=f"4 x {count} x n or 4 x n x {count} is expected",
+        f"y_k_j has the shape {y.shape}, but t has {count} times; 4 x {count} x n or 4 x n x "
+        f"{count} is expected",
     )
 
 
@@ -119,8 +119,6 @@ def _noise(file: Arrays) -> Noise:
     for key, variance in variances.items():
         if not variance.size or not (variance >= 0).all():
             raise ForeignFileError(
-                file.path,
-                f"{key} is {variance}",
-                expected="variances that are not negative are expected",
+                file.path, f"{key} is {variance}; variances that are not negative are expected"
             )
     return Noise(*(float(np.sqrt(np.mean(variance))) for variance in variances.values()))

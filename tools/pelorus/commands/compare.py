@@ -11,9 +11,17 @@ from rich.markup import escape
 
 from pelorus.commands.choices import PROGRAMS
 from pelorus.errors import PelorusError
-from pelorus.flight import flight_json
-from pelorus.flight.difference import Difference, PoseDistance
-from pelorus.flight.judge import BitsVerdict, Desk, Judgement, judge, of_this_version, verdict_of
+from pelorus.flight.judge import (
+    BitsVerdict,
+    Desk,
+    Difference,
+    Judgement,
+    PoseDistance,
+    comparison_json,
+    judge,
+    of_this_version,
+    verdict_of,
+)
 from pelorus.flight.log import NOWHERE, Frame, read_log
 from pelorus.native.replay import find_programs
 from pelorus.program.console import err, out, print_json
@@ -88,7 +96,7 @@ def compare_log(
     with err.status(f"replaying {log.frames} frames"):
         judgements = judge(log, desk)
     if as_json:
-        print_json(flight_json.of(log, judgements))
+        print_json(comparison_json(log, judgements))
         return verdict_of(judgements)
     for remark in log.remarks:
         _line("log", remark)

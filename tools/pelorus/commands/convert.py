@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -37,30 +35,13 @@ app = typer.Typer(
 )
 
 
-def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
-    """Returns the command with an option for each small sensor's file, which it gets by name."""
-    options = [
-        inspect.Parameter(
-            sensor.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=typer.Option([], help=readings_csv.columns_of(sensor)),
-            annotation=list[Path],
-        )
-        for sensor in SMALL_SENSORS
-    ]
-    known = inspect.signature(command, eval_str=True).parameters.values()
-    own = [p for p in known if p.kind is not inspect.Parameter.VAR_KEYWORD]
-    command.__dict__["__signature__"] = inspect.Signature([*own, *options])
-    return command
+SENSORS = {
+    sensor.name: (list[Path], typer.Option([], help=readings_csv.columns_of(sensor)))
+    for sensor in SMALL_SENSORS
+}
 
 
-@app.command(
-    rich_help_panel=OWN_DATA,
-    epilog="Example:  pelorus convert csv --twists twists.csv --stereo stereo.csv "
-    "--calibration camera.json --wheel wheel.csv mine.plr",
-)
-@_with_small_sensors
-def csv(
+def _csv(
     target: Path = own.TARGET,
     twists: Path | None = own.TWISTS,
     gyro: Path | None = own.GYRO,
@@ -73,13 +54,12 @@ def csv(
     calibration: list[Path] = typer.Option(
         [],
         help="Of Kalibr (and a second time, its IMU file), ROS, OpenCV, ORB-SLAM3, VINS-Fusion, "
-        "Basalt, OKVIS, SVO, maplab, ZED or OAK (docs/CONVERT.md), or, of a rectified pair, "
-        "JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB, as three rows of three, with "
-        "t_CB_m (body to left camera) or R_BC with t_BC_m (the camera's pose in the body); "
-        "optional image_width_px, image_height_px, body_axes (forward-left-up, forward-right-down, "
-        "other), twist_timing (start, end, mid), name, and noise, an object with some of "
-        "pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, bias_velocity_sigma_mps, "
-        "bias_gyro_sigma_radps.",
+        "Basalt, OKVIS, SVO, maplab, ZED or OAK (docs/CONVERT.md), or, of a rectified pair, JSON: "
+        "fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB, as three rows of three, with t_CB_m "
+        "(body to left camera) or R_BC with t_BC_m (the camera's pose in the body); optional "
+        "image_width_px, image_height_px, body_axes (forward-left-up, forward-right-down, other), "
+        "twist_timing (start, end, mid), name, and noise, an object with some of pixel_sigma_px, "
+        "velocity_sigma_mps, gyro_sigma_radps, bias_velocity_sigma_mps, bias_gyro_sigma_radps.",
     ),
     truth: Path | None = own.TRUTH,
     columns: list[str] = own.COLUMNS,
@@ -108,6 +88,14 @@ def csv(
     )
     found = csv_converter.read(sources, readings, timing)
     importers.converted(found, timing, fix is Fix.AUTO, target)
+
+
+app.command(
+    "csv",
+    rich_help_panel=OWN_DATA,
+    epilog="Example:  pelorus convert csv --twists twists.csv --stereo stereo.csv "
+    "--calibration camera.json --wheel wheel.csv mine.plr",
+)(own.with_options(_csv, SENSORS))
 
 
 @app.command(

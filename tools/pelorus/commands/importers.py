@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import inspect
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -17,12 +15,8 @@ from rich.markup import escape
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
-from pelorus.converters import bag, csv, euroc, kitti, ros, streams, with_pictures
-from pelorus.converters.bag import Bag
+from pelorus.converters import csv, euroc, kitti, streams
 from pelorus.converters.columns import Columns
-from pelorus.converters.ros_frames import Cameras
-from pelorus.converters.ros_motion import MotionTopics, Wheels
-from pelorus.converters.ros_wheels import Beside
 from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
 from pelorus.program.console import out
@@ -31,7 +25,7 @@ from pelorus.wire.frames import TwistTiming
 
 OWN_DATA = "Your own data"
 RADIUS_MAX_M = 5.0
-# The options of all of them; a command gets their values as its argument `asked`.
+# The options of all of them, of which `_asked` makes what the readers take.
 SHARED: dict[str, tuple[Any, Any]] = {
     "calibration": (list[Path], own.CALIBRATION),
     "extrinsic": (Path | None, own.EXTRINSIC),
@@ -55,8 +49,8 @@ SHARED: dict[str, tuple[Any, Any]] = {
 class StampSource(StrEnum):
     """Times of a bag's messages: of their headers, or of their arrival."""
 
-    HEADER = bag.HEADER
-    LOG = bag.LOG
+    HEADER = "header"
+    LOG = "log"
 
 
 def register(app: typer.Typer) -> None:
@@ -70,23 +64,7 @@ def register(app: typer.Typer) -> None:
             name,
             rich_help_panel=OWN_DATA,
             epilog=f"Example:  pelorus convert {name} {example}",
-        )(_with_shared_options(command))
-
-
-def _with_shared_options(command: Callable[..., None]) -> Callable[..., None]:
-    def run(**given: Any) -> None:
-        shared = {name: given.pop(name) for name in SHARED}
-        command(asked=_asked(**shared), **given)
-
-    parameters = inspect.signature(command, eval_str=True).parameters.values()
-    own_ones = [p.replace(kind=p.KEYWORD_ONLY) for p in parameters if p.name != "asked"]
-    shared = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind)
-        for name, (kind, option) in SHARED.items()
-    ]
-    run.__dict__["__signature__"] = inspect.Signature([*own_ones, *shared])
-    run.__doc__ = command.__doc__
-    return run
+        )(own.with_options(command, SHARED))
 
 
 def _asked(
@@ -135,16 +113,16 @@ def _asked(
 
 
 def _euroc(
-    asked: Asked,
     folder: Path = typer.Argument(..., metavar="FOLDER", help="With mav0/cam0, cam1, imu0."),
     target: Path = own.TARGET,
+    **shared: Any,
 ) -> None:
     """A folder like EuRoC's or TUM-VI's (mav0): pictures, an IMU or your wheels, the truth."""
+    asked = _asked(**shared)
     _convert(euroc.read(folder, asked), asked, target)
 
 
 def _kitti(
-    asked: Asked,
     folder: Path = typer.Argument(
         ..., metavar="FOLDER", help="DATE_drive_NNNN_sync, or sequences/NN of the benchmark."
     ),
@@ -154,15 +132,16 @@ def _kitti(
     ),
     gyro_sigma: float = typer.Option(0.05, metavar="RAD/S", help="Likewise."),
     seed: int = typer.Option(1, help="Of that noise."),
+    **shared: Any,
 ) -> None:
     """A raw drive of KITTI with its OXTS, or a sequence of its odometry benchmark."""
+    asked = _asked(**shared)
     found = kitti.read(folder, asked, kitti.Made(velocity_sigma, gyro_sigma, seed))
     oxts = kitti.is_raw(folder) and asked.motion is None
     _convert(found, asked, target, TwistTiming.END if oxts else None)
 
 
 def _ros(
-    asked: Asked,
     source: Path = typer.Argument(
         ..., metavar="BAG", help="ROS 1 (.bag), ROS 2 (a folder with metadata.yaml), .mcap or .db3."
     ),
@@ -247,37 +226,30 @@ def _ros(
         0.0, "--from", metavar="S", help="Leave out what arrived before, s since the bag began."
     ),
     until: float = typer.Option(math.inf, metavar="S", help="Likewise, what arrived later."),
+    **shared: Any,
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
-    joints_alone = _wheels(joint_topic, joints, wheel_radius, track_width)
+    from pelorus.converters import ros  # noqa: PLC0415 - many modules that no other format needs
+    from pelorus.converters.bag import Bag  # noqa: PLC0415
+    from pelorus.converters.ros_beside import Beside  # noqa: PLC0415
+    from pelorus.converters.ros_frames import Cameras  # noqa: PLC0415
+    from pelorus.converters.ros_motion import MotionTopics, Wheels  # noqa: PLC0415
+
+    asked = _asked(**shared)
+    infos, apart_ns = (left_info_topic, right_info_topic), round(pair_within * 1e6)
+    cameras = Cameras(left_topic, right_topic, tracks_topic, apart_ns, *infos, camera_frame)
+    wheels = None
+    if _are_wheels(joint_topic, joints, wheel_radius, track_width):
+        wheels = Wheels(joint_topic, tuple(joints), wheel_radius, track_width)
     beside = None
-    if wheel_topic or (joints_alone and imu_topic):
+    if wheel_topic or (wheels and imu_topic):
         _require_imu(wheel_topic, twist_topic, joint_topic)
         told = (wheel_sigma, wheel_axes, track_width, wheel_standstill, wheel_slide)
-        beside, joints_alone = Beside(wheel_topic, joints_alone, *told), None
-    topics = ros.Topics(
-        Cameras(
-            left_topic,
-            right_topic,
-            tracks_topic,
-            round(pair_within * 1e6),
-            left_info_topic,
-            right_info_topic,
-            camera_frame,
-        ),
-        MotionTopics(
-            twist_topic,
-            gyro_topic,
-            imu_topic,
-            joints_alone,
-            body_frame,
-            truth_topic,
-            beside is not None,
-        ),
-        position_topic,
-        position_sigma,
-        beside,
+        beside, wheels = Beside(wheel_topic, wheels, *told), None
+    moving = MotionTopics(
+        twist_topic, gyro_topic, imu_topic, wheels, body_frame, truth_topic, beside is not None
     )
+    topics = ros.Topics(cameras, moving, position_topic, position_sigma, beside)
     with Bag(source, stamps.value, (begin, until)) as opened:
         _convert(ros.read(opened, topics, asked), asked, target)
 
@@ -295,21 +267,24 @@ def _require_imu(wheel_topic: str, twist_topic: str, joint_topic: str) -> None:
         )
 
 
-def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> Wheels | None:
+def _are_wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> bool:
+    """Returns whether joints are named; raises PelorusError where more must be known of them."""
     if not topic and not joints:
-        return None
+        return False
     if not topic or not joints or not 0 < radius_m < RADIUS_MAX_M or track_m < 0:
         raise PelorusError(
             "wheels: --joint-topic TOPIC, --joint NAME (once or more) and --wheel-radius M "
             "are expected"
         )
-    return Wheels(topic, tuple(joints), radius_m, track_m)
+    return True
 
 
 def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
     whole = replace(found, remarks=[*asked.remarks, *found.remarks])
     timing = usual if asked.timing is None else asked.timing
     if asked.keep_pictures:
+        from pelorus.converters import with_pictures  # noqa: PLC0415 - it loads the library
+
         for remark in whole.all_remarks:
             out.print(escape(remark))
         made, findings = with_pictures.recording(whole)

@@ -10,11 +10,10 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.converters.wheels import WHEEL
 from pelorus.evaluate import survey_json
 from pelorus.evaluate.inertial_survey import ImuSurvey
 from pelorus.evaluate.survey import SensorSurvey, Survey, TrackSurvey, require_useful, survey
-from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.io.small_sensors import SMALL_SENSORS, WHEEL
 from pelorus.program.console import one_line, out, print_json
 from pelorus.wire.calibrated import Calibrated
 from pelorus.wire.frames import Config, Header, Kind, Process

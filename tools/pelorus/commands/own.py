@@ -3,10 +3,31 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import typer
 
 from pelorus.commands.choices import Fix
 from pelorus.converters.streams import TwistIn
+
+
+def with_options(
+    command: Callable[..., None], options: Mapping[str, tuple[Any, Any]]
+) -> Callable[..., None]:
+    """Returns the command with more options, each a type and a typer.Option, which it gets by
+    name, as **given.
+    """
+    known = inspect.signature(command, eval_str=True).parameters.values()
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    own = [p.replace(kind=keyword) for p in known if p.kind is not inspect.Parameter.VAR_KEYWORD]
+    more = [
+        inspect.Parameter(name, keyword, default=option, annotation=kind)
+        for name, (kind, option) in options.items()
+    ]
+    command.__dict__["__signature__"] = inspect.Signature([*own, *more])
+    return command
 
 
 def names(words: str) -> tuple[str, ...]:

@@ -3,24 +3,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import typer
 from rich.markup import escape
 
-from pelorus.errors import PelorusError, resolved
+from pelorus.errors import PelorusError, resolved, whole, writing
 from pelorus.eyes.front_end import CORNERS, Eyes, Shown
 from pelorus.eyes.front_end import track as track_all
 from pelorus.io.tracks import Tracks
+from pelorus.math.motion import Times
 from pelorus.native import vision
 from pelorus.program.console import out, progress
-from pelorus.tracking import images, output, sheet
+from pelorus.tracking import images, sheet
 from pelorus.tracking.images import Gray, Pair
 from pelorus.tracking.row_gaps import TOLD_ABOVE_PX, row_gaps
 
 EXAMPLE = "pelorus track image_l image_r stereo.csv --rate 10 --sheet tracks.png"
+
+COLUMNS = "t_ns,id,uL_px,vL_px,uR_px,vR_px"
 
 app = typer.Typer()
 
@@ -78,10 +81,10 @@ def track(
     eyes = Eyes(None, size, corners=corners, disparity_max_px=disparity_max)
     shown_pairs = zip(t_ns.tolist(), _read(pairs, bits, shown), strict=True)
     tracks = track_all((Shown(t, *pair) for t, pair in shown_pairs), eyes, (left, right))
-    files = {target: output.csv_text(t_ns, tracks).encode()}
+    files = {target: _csv_text(t_ns, tracks).encode()}
     if sheet_file is not None:
         files[sheet_file] = sheet.sheet(shown, [pair.left.name for pair in pairs], tracks)
-    output.write_all(files)
+    _write_all(files)
     _say(target, tracks)
 
 
@@ -103,6 +106,23 @@ def _read(pairs: list[Pair], bits: int, shown: dict[int, Gray]) -> Iterator[tupl
         if k in wanted:
             shown[k] = left
         yield left, right
+
+
+def _csv_text(t_ns: Times, tracks: Tracks) -> str:
+    """Returns a row for each observation; pixels to a thousandth."""
+    rows = zip(t_ns[tracks.frame].tolist(), tracks.id.tolist(), tracks.pixels.tolist(), strict=True)
+    lines = [f"{t},{id},{','.join(f'{p:.3f}' for p in pixels)}" for t, id, pixels in rows]
+    return "\n".join([COLUMNS, *lines, ""])
+
+
+def _write_all(files: Mapping[Path, bytes]) -> None:
+    """Writes all of them whole, or none of them anew."""
+    with whole(*files) as parts:
+        for (path, content), part in zip(files.items(), parts, strict=True):
+            with writing(path):
+                if path.is_dir():
+                    raise IsADirectoryError(21, "is a folder")
+                part.write_bytes(content)
 
 
 def _say(target: Path, tracks: Tracks) -> None:

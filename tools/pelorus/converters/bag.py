@@ -11,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from pelorus.converters.transforms import Tree
 from pelorus.errors import PelorusError
 from pelorus.io.foreign import ForeignFileError
 from pelorus.program.extras import extra
@@ -36,17 +37,11 @@ class Stamped(NamedTuple):
     arrival_ns: int
 
 
-def require_messages(bag: Bag, topic: str, count: int) -> None:
-    """Refuses a topic of which nothing can be read, whatever the bag's index says."""
-    if not count:
-        raise ForeignFileError(bag.path, "no message can be read", at=topic)
-
-
 class Bag(AbstractContextManager["Bag"]):
     """An open bag.
 
     `stamps`: whether a message's time is its header's or its arrival; `part`: which messages are
-    read, by their arrival, s since the bag's beginning.
+    read, by their arrival, s since the bag's beginning. `remarks` are on what was read of it.
     """
 
     def __init__(self, path: Path, stamps: str = HEADER, part: tuple[float, float] = WHOLE) -> None:
@@ -56,9 +51,9 @@ class Bag(AbstractContextManager["Bag"]):
         if path.is_dir() and not (path / "metadata.yaml").is_file():
             raise ForeignFileError(
                 path,
-                "is a folder without metadata.yaml",
-                expected="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap "
-                "or a .db3 is expected (ros2 bag reindex makes a metadata.yaml)",
+                "is a folder without metadata.yaml; a ROS 1 bag (.bag), a ROS 2 bag (a folder with "
+                "metadata.yaml), a .mcap or a .db3 is expected (ros2 bag reindex makes a "
+                "metadata.yaml)",
             )
         self._open_files = ExitStack()
         self._reader = self._opened()
@@ -66,6 +61,7 @@ class Bag(AbstractContextManager["Bag"]):
         self.begins_ns = int(self._reader.start_time)
         self._part_s = part
         self.wrapped: dict[str, None] = {}  # topics whose counter wrapped
+        self.remarks: list[str] = []
 
     def _opened(self) -> AnyReader:
         with extra("rosbags"):
@@ -85,6 +81,19 @@ class Bag(AbstractContextManager["Bag"]):
         trace: TracebackType | None,
     ) -> None:
         self._open_files.close()
+
+    @cached_property
+    def tree(self) -> Tree:
+        """Returns the poses of the robot's frames."""
+        return Tree(self)
+
+    def where(self, topic: str) -> Path:
+        """Returns the bag with the topic, as a path for messages to the user."""
+        return self.path / topic.lstrip("/")
+
+    def error(self, topic: str, what: str) -> ForeignFileError:
+        """Returns an error in the messages of a topic."""
+        return ForeignFileError(self.path, what, at=topic)
 
     @property
     def types(self) -> dict[str, str]:
@@ -181,10 +190,8 @@ class Bag(AbstractContextManager["Bag"]):
         words = (str(error).splitlines() or [type(error).__name__])[0]
         return ForeignFileError(
             self.path,
-            f"cannot be read as a bag: {words}",
-            expected="a whole ROS 1 bag, ROS 2 bag or .mcap is expected (rosbag reindex, ros2 bag "
-            "reindex or "
-            "mcap recover mend one that was cut short)",
+            f"cannot be read as a bag: {words}; a whole ROS 1 bag, ROS 2 bag or .mcap is expected "
+            "(rosbag reindex, ros2 bag reindex or mcap recover mend one that was cut short)",
         )
 
 

@@ -194,9 +194,8 @@ def _column(words: str) -> Column:
     column, colon, unit = rest.partition(":")
     if not equals or not column or short not in NAMES:
         raise PelorusError(
-            f"--columns {words}: NAME=COLUMN is expected, such as v=speed_mps,t=stamp_ms; "
-            "names are "
-            f"{', '.join(NAMES)}, also for one file: wheel.t=stamp_ms"
+            f"--columns {words}: NAME=COLUMN is expected, such as v=speed_mps,t=stamp_ms; names "
+            f"are {', '.join(NAMES)}, also for one file: wheel.t=stamp_ms"
         )
     target, units = NAMES[short]
     unit = unit if colon else _unit_in(column)

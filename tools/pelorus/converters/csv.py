@@ -16,17 +16,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import scipy
 
 from pelorus.converters import readings_csv, streams, twist_axes, wheels
 from pelorus.converters.columns import Columns, example
 from pelorus.converters.streams import RawTracks, Readings, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
-from pelorus.faults.finding import Finding
 from pelorus.io import foreign, trajectory
 from pelorus.io.foreign import ForeignFileError
-from pelorus.io.recording import Recording
-from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.io.small_sensors import SMALL_SENSORS, STANDSTILL
 from pelorus.io.table import Table
 from pelorus.io.tracks import Tracks
 from pelorus.io.trajectory import Trajectory
@@ -48,6 +45,7 @@ RATES = {short: name for short, name in VELOCITIES.items() if short[0] == "w"}
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 PIXELS = ("uL_px", "vL_px", "uR_px", "vR_px")
 POSITION, QUATERNION = ("px_m", "py_m", "pz_m"), ("qx", "qy", "qz", "qw")
+NO_ROTATION = "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)"
 NAMES_ITS_COLUMNS = 0.5  # share of the first row's cells with letters, where others have numbers
 
 
@@ -80,19 +78,6 @@ class Sources:
     columns: Columns = field(default_factory=Columns)
 
 
-def convert(
-    sources: Sources,
-    fix: bool = True,
-    twist_timing: TwistTiming | None = None,
-    readings: Mapping[str, list[Path]] | None = None,
-) -> tuple[Recording, list[Finding]]:
-    """Reads the files; with `fix` also mends the recording and measures its noise.
-
-    `twist_timing` overrides the calibration's. `readings` are the files of small sensors, by name.
-    """
-    return streams.converted(read(sources, readings or {}, twist_timing), twist_timing, fix)
-
-
 def read(
     sources: Sources,
     readings: Mapping[str, list[Path]],
@@ -105,7 +90,7 @@ def read(
     motion = motion_of(sources.motion, columns, timing)
     truth = None if sources.truth is None else truth_of(sources.truth, columns)
     small = _readings(readings, motion, columns)
-    if isinstance(motion, Readings) and not readings.get(wheels.STANDSTILL.name):
+    if isinstance(motion, Readings) and not readings.get(STANDSTILL.name):
         small += wheels.standing(small, columns.remarks)
     if sources.stereo is None:
         frames = _blind(motion, small, columns.remarks)
@@ -167,10 +152,8 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
         if files.gyro is None and not any(map(table.has, RATES.values())):
             raise ForeignFileError(
                 imu,
-                "has no rates of turn",
-                expected=f"{', '.join(RATES.values())} are expected, or --gyro FILE with them; "
-                "there are: "
-                f"{', '.join(table.names)}",
+                f"has no rates of turn; {', '.join(RATES.values())} are expected, or --gyro FILE "
+                f"with them; there are: {', '.join(table.names)}",
             )
         if files.gyro is None:
             table.leave_out_bad(*FORCES, *RATES.values())
@@ -208,9 +191,9 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
         otherwise = example(lacking[0], table.names)
         raise ForeignFileError(
             path,
-            f"lacks the column {', '.join(lacking)}",
-            expected=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
-            f"{','.join(there)}. If they are called otherwise: --columns {otherwise}",
+            f"lacks the column {', '.join(lacking)}; there are: {', '.join(table.names)}. If "
+            f"nothing measures them: --measured {','.join(there)}. If they are called otherwise: "
+            f"--columns {otherwise}",
         )
     table.require(*lacking)
     table.leave_out_bad(*(name for short, name in VELOCITIES.items() if short in measured))
@@ -232,14 +215,8 @@ def _poses_beside(table: Table) -> Poses | None:
     if all(map(table.has, POSITION)):
         p = table.numbers(*POSITION)
     q = table.numbers(*QUATERNION)
-    off = np.abs(np.linalg.norm(q, axis=1) - 1)
-    if off.max() > trajectory.QUATERNION_NORM_TOLERANCE:
-        raise ForeignFileError(
-            table.path,
-            "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
-            at=table.row(int(off.argmax())),
-        )
-    return Poses(np.asarray(scipy.spatial.transform.Rotation.from_quat(q).as_matrix()), p)
+    table.refuse(trajectory.off_unit(q), NO_ROTATION)
+    return Poses.of_quaternions(q, p)
 
 
 def _readings(
@@ -247,17 +224,10 @@ def _readings(
 ) -> list[Reading]:
     """Reads all small sensors."""
     found: list[Reading] = []
-    t_ns = motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
     files = [(sensor, path) for sensor in SMALL_SENSORS for path in paths.get(sensor.name, [])]
     for sensor, path in files:
         own = readings_csv.read(columns.read(path, sensor.name), sensor)
-        first, last = own[0].t_ns, own[-1].t_ns
-        if last < t_ns[0] or t_ns[-1] < first:
-            raise ForeignFileError(
-                path,
-                f"spans {first} to {last} ns, {motion.where} {t_ns[0]} to "
-                f"{t_ns[-1]} ns: they do not overlap",
-            )
+        streams.require_overlap(path, np.array([m.t_ns for m in own], np.int64), motion)
         found += own
     return found
 
@@ -274,9 +244,7 @@ def _stereo(table: Table) -> tuple[Times, Tracks]:
     pixels = table.numbers(*PIXELS)
     tracks = Tracks.from_rows(len(frame_t_ns), frame.reshape(-1).astype(np.intp), id, pixels)
     tracks.check(path)
-    twice = (np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)
-    if twice.any():
-        k = int(np.nonzero(twice)[0][0])
+    if (k := tracks.twice()) is not None:
         t_ns = frame_t_ns[tracks.frame[k]]
         rows = table.rows[(row_t_ns == t_ns) & (id == tracks.id[k])]
         raise ForeignFileError(
@@ -299,12 +267,9 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
     table.leave_out_bad(*QUATERNION, *POSITION)
     t_ns, p = table.ascending_times(), table.numbers(*POSITION)
     q = table.numbers(*QUATERNION)
-    off = np.abs(np.linalg.norm(q, axis=1) - 1) > trajectory.QUATERNION_NORM_TOLERANCE
-    what = "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)"
-    table.remarks += foreign.left_out(path, off, table.row, what)
-    return Trajectory(
-        t_ns[~off], Poses(scipy.spatial.transform.Rotation.from_quat(q[~off]).as_matrix(), p[~off])
-    )
+    off = trajectory.off_unit(q)
+    table.remarks += foreign.left_out(path, off, table.row, NO_ROTATION)
+    return Trajectory(t_ns[~off], Poses.of_quaternions(q[~off], p[~off]))
 
 
 def _names_columns(cells: Sequence[str]) -> bool:

@@ -14,13 +14,12 @@ import numpy as np
 
 from pelorus.faults.finding import Finding
 from pelorus.io.recording import Recording
-from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.io.small_sensors import POSITION
 from pelorus.math import motion
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import BodyAxes, Reading, Start, StartFlag
 from pelorus.wire.layout import Floats, pack_symmetric
 
-POSITION = next(sensor for sensor in SMALL_SENSORS if sensor.name == "position")
 LEVEL = {
     BodyAxes.FORWARD_LEFT_UP: np.eye(3),
     BodyAxes.FORWARD_RIGHT_DOWN: np.diag([1.0, -1.0, -1.0]),

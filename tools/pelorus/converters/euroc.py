@@ -28,10 +28,8 @@ from pelorus.math import motion, se3
 from pelorus.math.inertial import Inertial
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
-from pelorus.rig import kalibr
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
-from pelorus.rig.rig import rigid
 from pelorus.tracking import images
 from pelorus.tracking.images import Pair
 
@@ -104,9 +102,7 @@ def _of_body(folder: Path) -> Poses | None:
     if not path.is_file():
         return None
     content = Named(path, foreign.yaml_object(path))
-    if "T_BS" not in content:
-        return None
-    return rigid(path, "T_BS", kalibr.matrix(content, "T_BS", 4, 4))
+    return content.pose("T_BS") if "T_BS" in content else None
 
 
 def _on_imu(calibrated: Calibrated, body_of_imu: Poses) -> Calibrated:
@@ -127,24 +123,20 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
     where = top / ordered[0], top / ordered[1]
     (left, lost_left), (right, lost_right) = (_listed(camera, remarks) for camera in where)
     of_left, of_right = _times(left, remarks), _times(right, remarks)
-    both = images.together(of_left, of_right, images.APART_NS)
+    found = images.together(of_left, of_right, images.APART_NS)
+    both, alone = found
     t_ns, partner_ns = of_left[both[:, 0]], of_right[both[:, 1]]
-    alone, lost = len(of_left) + len(of_right) - 2 * len(both), [*lost_left, *lost_right]
+    lost = [*lost_left, *lost_right]
     if images.too_many_alone(len(both), max(alone, len(lost))):
         raise PelorusError(
             f"{where[0]} and {where[1]}: {len(both)} pairs, taken within "
             f"{images.APART_NS * 1e-6:g} ms; {alone} pictures have no partner"
             + (f", {len(lost)} are not there or cut off, {lost[0]} first" if lost else "")
-            + (
-                _apart_words(of_left, of_right)
-                if len(of_left) and len(of_right) and not lost
-                else ""
-            )
+            + ("" if lost else _apart_words(of_left, of_right))
         )
     if len(both) < images.PAIRS_MIN:
         raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are expected")
-    if alone:
-        remarks.append(f"{alone} pictures have no partner and are left out")
+    remarks += found.remarks
     if (t_ns != partner_ns).any():
         apart_ms = float(np.abs(t_ns - partner_ns).max()) * 1e-6
         remarks.append(
@@ -167,6 +159,8 @@ def _times(listed: dict[int, Path], remarks: list[str]) -> Times:
 
 def _apart_words(left_ns: Times, right_ns: Times) -> str:
     """Returns in words how far apart the times of cameras without a common trigger are."""
+    if not len(left_ns) or not len(right_ns):
+        return ""
     apart_ns = np.abs(right_ns[motion.nearest(right_ns, left_ns)] - left_ns)
     return (
         f"; the nearest times are {np.median(apart_ns) * 1e-6:.3g} ms apart in the median, "
@@ -194,9 +188,8 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
         if len(cells) != 2 or not cells[0].isdecimal() or int(cells[0][:20]) >= NS_MAX:
             raise ForeignFileError(
                 listing,
-                f"holds {' '.join(cells)[:60]!r}",
+                f"holds {' '.join(cells)[:60]!r}; a time in ns, a file are expected",
                 at=f"line {line}",
-                expected="a time in ns, a file are expected",
             )
         path = data / cells[1]
         found = there.pop(path.stem, None)  # a picture may be another kind of file

@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""How points in the pictures are expected to have moved, by twists or by a gyro."""
+"""Pictures become tracks: how points are expected to have moved, by twists or a gyro, and did."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import chain
+
 import numpy as np
 
-from pelorus.eyes.front_end import Motion
+from pelorus.converters.repeated import Repeats
+from pelorus.converters.streams import Pictures, Streams, Twists
+from pelorus.eyes.front_end import Eyes, Motion, Shown, track
+from pelorus.io.tracks import Tracks
 from pelorus.math import motion, se3
 from pelorus.math.inertial import Inertial
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
-from pelorus.wire.frames import TwistTiming
+from pelorus.program.console import progress
+from pelorus.tracking import images
+from pelorus.wire.frames import Header, TwistTiming
 from pelorus.wire.layout import Floats
 
 MOST_M = 100.0  # from pair to pair; more is another unit
@@ -60,3 +69,42 @@ class Expected:
         p = np.zeros(3) if self._turns_alone else seen.p
         finite = np.isfinite(seen.R).all() and np.isfinite(p).all()
         return (seen.R, p) if finite and np.abs(p).max() <= MOST_M else None
+
+
+def _expected(streams: Streams, header: Header, t_ns: Times) -> Expected:
+    """Returns how points of pictures of these times are expected to have moved."""
+    T_CB, motion = Poses(header.R_CB, header.t_CB_m), streams.motion
+    if isinstance(motion, Twists):
+        moved = motion.t_ns, motion.v_B_mps, motion.w_B_radps
+        return Expected.by_twists(t_ns, T_CB, moved, motion.measured, header.twist_timing)
+    return Expected.by_gyro(t_ns, T_CB, streams.calibrated.imu.correction.of(motion.inertial))
+
+
+def tracked(
+    streams: Streams, pictures: Pictures, t_ns: Times, repeats: Repeats
+) -> tuple[Header, Tracks]:
+    """Returns the HEADER of the rectified pictures, and the tracks in them."""
+    calibrated = streams.calibrated
+    pairs = pictures.read()
+    first = next(pairs)
+    height, width = first[0].shape
+    header, rig = calibrated.header, calibrated.rig
+    images.require_size(pictures.where[0], first[0].shape, calibrated.sizes)
+    if rig is not None:
+        rig = rig.of_size(width, height)
+        header = rig.header(rig.rectification(), header.name)
+    header = replace(header, image_width_px=width, image_height_px=height)
+
+    def shown() -> Iterator[Shown]:
+        last = None
+        for k, pair in enumerate(chain((first,), pairs)):
+            for where, picture in zip(pictures.where, pair, strict=True):
+                images.require_alike(where, picture, first[0])
+            if not repeats.leaves_out(*pair):
+                motion = None if last is None else expected.between(last, k)
+                yield Shown(int(t_ns[k]), *pair, motion)
+                last = k
+
+    expected = _expected(streams, header, t_ns)
+    eyes = Eyes(header.camera, (width, height), rig)
+    return header, track(progress(shown(), "tracking", len(pictures.t_ns)), eyes, pictures.where)

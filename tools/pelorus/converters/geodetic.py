@@ -57,9 +57,8 @@ class Ground:
         if np.abs(found).max() > LOCAL_MAX_M:
             raise ForeignFileError(
                 path,
-                f"a place lies {np.abs(found).max() * 1e-3:.4g} km from the first one",
-                expected=f"at most {LOCAL_MAX_M * 1e-3:g} km are expected: is there a row without "
-                "a fix?",
+                f"a place lies {np.abs(found).max() * 1e-3:.4g} km from the first one; at most "
+                f"{LOCAL_MAX_M * 1e-3:g} km are expected: is there a row without a fix?",
             )
         remarks.append(
             f"{path}: places in {crs.name} become metres east, north and up of the first one "
@@ -93,9 +92,8 @@ def localise(table: Table, ground: Ground) -> None:
     if not by_degrees and not ground.crs:
         raise ForeignFileError(
             table.path,
-            f"{' and '.join(GRID)}: in which grid?",
-            expected="--crs EPSG:326NN is expected for zone NN north of UTM on WGS 84, EPSG:327NN "
-            "for south",
+            f"{' and '.join(GRID)}: in which grid?; --crs EPSG:326NN is expected for zone NN north "
+            "of UTM on WGS 84, EPSG:327NN for south",
         )
     if by_degrees != (ground.system().is_geographic if ground.crs else True):
         raise ForeignFileError(table.path, f"has {' and '.join(names)}, and --crs is {ground.crs}")

@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pelorus.converters import imu_noise, renewal
+from pelorus.converters import renewal
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import findings_of
@@ -29,11 +29,12 @@ from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import Tracks
-from pelorus.math import se3
+from pelorus.math import inertial, se3
 from pelorus.math.axes import body_axes
-from pelorus.math.inertial import Inertial
+from pelorus.math.inertial import Inertial, MotionState
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
+from pelorus.rig.lens import intrinsics
 from pelorus.wire.frames import (
     Header,
     Noise,
@@ -46,9 +47,26 @@ from pelorus.wire.frames import (
 from pelorus.wire.layout import Floats, pack_symmetric
 
 QUATERNION_NORM_TOLERANCE = 1e-3
+MAD_TO_SIGMA = 1.4826  # of a normal distribution
+FAITHFUL = 1.5  # ratio to the given noise, above which the readings do not fit
 ALIGNED_M = 1e-4  # tolerance of the right camera's place in the left one: (baseline, 0, 0)
 GRAVITY_TILT = 1e-6
 SAME_TIME_NS = 1000  # largest distance of a start from its reading
+
+
+class TrueMotion(NamedTuple):
+    """Poses, velocity in body axes and biases, (k, 3) each, at some times."""
+
+    t_ns: Times
+    R: Floats
+    p: Floats
+    v_B: Floats
+    bias_accel: Floats
+    bias_gyro: Floats
+
+    def at(self, index: slice) -> TrueMotion:
+        vectors = (part[index] for part in self[1:])
+        return TrueMotion(self.t_ns[index], *vectors)
 
 
 class StartSigmas(NamedTuple):
@@ -92,7 +110,7 @@ class Choices:
 def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
     """Returns the recording, how its readings fit its truth, and its named faults."""
     recording, truth = read(source, choices.start)
-    findings = [imu_noise.compare(recording, truth)]
+    findings = [_compare(recording, truth)]
     chance = np.random.Generator(np.random.PCG64(choices.seed or 0))
     if choices.seed is not None:
         recording, finding = renewal.renew(source, recording, chance)
@@ -106,7 +124,7 @@ def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
     return recording, [*findings, *findings_of(recording)]
 
 
-def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, imu_noise.TrueMotion]:
+def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, TrueMotion]:
     """Reads the file as it is, and its true motion."""
     file = arrays.read_npz(source)
     calib = _Calib(source, foreign.json_words(source, file.words("calib")), "calib")
@@ -141,6 +159,65 @@ def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, im
     return recording, truth
 
 
+# --- how well the readings fit the truth ----------------------------------------------------------
+
+
+def _compare(recording: Recording, truth: TrueMotion) -> Finding:
+    """Compares the readings with the truth: white noise changes a velocity by density sqrt(tau)."""
+    readings, noise = recording.inertial, recording.header.noise
+    first, last = np.searchsorted(truth.t_ns, (readings.t_ns[0], readings.t_ns[-1] + 1))
+    truth = truth.at(slice(int(first), int(last)))
+    before, after = truth.at(slice(None, -1)), truth.at(slice(1, None))
+    if not len(after.t_ns):
+        return Finding("noise of the readings", False, "no two true poses", "", is_conclusive=False)
+    start = MotionState(before.R, before.p, before.v_B)
+    ends = inertial.coasted(
+        _without_bias(readings, truth), before.t_ns, after.t_ns, start, noise.gravity
+    )
+    tau = (after.t_ns - before.t_ns) * 1e-9
+    turn = scipy.spatial.transform.Rotation.from_matrix(
+        np.swapaxes(ends.R, 1, 2) @ after.R
+    ).as_rotvec()
+    return _judge(
+        _sigma(turn / np.sqrt(tau)[:, None]) / noise.gyro_noise,
+        _sigma((after.v_B - ends.v_B) / np.sqrt(tau)[:, None]) / noise.accel_noise,
+        noise.gyro_noise,
+        noise.accel_noise,
+    )
+
+
+def _without_bias(readings: Inertial, truth: TrueMotion) -> Inertial:
+    bias = Inertial(truth.t_ns, truth.bias_accel, truth.bias_gyro).between(readings.t_ns)
+    return Inertial(
+        readings.t_ns,
+        readings.a_B_mps2 - bias.a_B_mps2,
+        readings.w_B_radps - bias.w_B_radps,
+    )
+
+
+def _sigma(differences: Floats) -> float:
+    """Returns the sigma of an axis about its median, so that a small bias does not count."""
+    middle = np.median(differences, axis=0)
+    return float(
+        np.sqrt(np.mean((MAD_TO_SIGMA * np.median(abs(differences - middle), axis=0)) ** 2))
+    )
+
+
+def _judge(gyro: float, accel: float, gyro_noise: float, accel_noise: float) -> Finding:
+    found = max(gyro, accel) > FAITHFUL
+    return Finding(
+        "noise of the readings",
+        found,
+        f"from one true pose to the next the gyro is off by {gyro:.2f} and the accelerometer by "
+        f"{accel:.2f} times what calib tells",
+        "the HEADER has what calib tells; the filter adds what the readings scatter, and no more: "
+        f"if it says TWIST_CONTRADICTED, --set gyro-noise={gyro * gyro_noise:.2g} "
+        f"accel-noise={accel * accel_noise:.2g} or more (tools/config/imu-*.conf)"
+        if found
+        else "none: the HEADER has what calib tells",
+    )
+
+
 # --- arrays ---------------------------------------------------------------------------------------
 
 
@@ -165,10 +242,7 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
     back = np.nonzero(np.diff(seconds) < 0)[0]
     if len(back):
         raise ForeignFileError(
-            path,
-            "stereo_t goes back",
-            at=f"row {back[0] + 1}",
-            expected="rows in order of time are expected",
+            path, "stereo_t goes back; rows in order of time are expected", at=f"row {back[0] + 1}"
         )
     id = file.get("stereo_id", shape=(count,))
     whole = (id == np.floor(id)) & (id >= 0) & (id < 2.0**32)
@@ -176,20 +250,17 @@ def _tracks(file: Arrays) -> tuple[Times, Tracks]:
         row = int(np.argmin(whole))
         raise ForeignFileError(
             path,
-            f"stereo_id is {id[row]:g}",
+            f"stereo_id is {id[row]:g}; a whole number below 2^32 is expected",
             at=f"row {row}",
-            expected="a whole number below 2^32 is expected",
         )
     t_ns, frame = np.unique(np.round(seconds * 1e9).astype(np.int64), return_inverse=True)
     tracks = Tracks.from_rows(
         len(t_ns), frame, id.astype(np.int64), file.get("stereo_px", shape=(count, 4))
     )
-    twice = np.nonzero((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0))[0]
-    if len(twice):
-        k = twice[0]
+    if (k := tracks.twice()) is not None:
+        seconds_of = t_ns[tracks.frame[k]] * 1e-9
         raise ForeignFileError(
-            path,
-            f"id {tracks.id[k]} stands twice in the frame of {t_ns[tracks.frame[k]] * 1e-9:.6f} s",
+            path, f"id {tracks.id[k]} stands twice in the frame of {seconds_of:.6f} s"
         )
     return t_ns, tracks
 
@@ -201,7 +272,7 @@ def _only(tracks: Tracks, frames: NDArray[np.bool_]) -> Tracks:
     return replace(tracks, frame_count=int(frames.sum()), frame=number[tracks.frame]).at(rows)
 
 
-def _truth(file: Arrays) -> imu_noise.TrueMotion:
+def _truth(file: Arrays) -> TrueMotion:
     t_ns = _times(file, "truth_t")
     numbers = file.get("truth", shape=(len(t_ns), 10))
     R = _rotations(file.path, "truth", numbers[:, :4])
@@ -209,7 +280,7 @@ def _truth(file: Arrays) -> imu_noise.TrueMotion:
     bias_t_ns = _times(file, "bias_t")
     bias = file.get("bias", shape=(len(bias_t_ns), 6))
     own = Inertial(bias_t_ns, bias[:, 3:], bias[:, :3]).between(t_ns)
-    return imu_noise.TrueMotion(t_ns, R, numbers[:, 4:7], v_B, own.a_B_mps2, own.w_B_radps)
+    return TrueMotion(t_ns, R, numbers[:, 4:7], v_B, own.a_B_mps2, own.w_B_radps)
 
 
 def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
@@ -220,11 +291,10 @@ def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
         row = int(wrong[0])
         raise ForeignFileError(
             path,
-            f"the quaternion's norm is {norms[row]:.4f}",
+            f"the quaternion's norm is {norms[row]:.4f}; 1 is expected, in the order x y z w",
             at=f"{key} row {row}",
-            expected="1 is expected, in the order x y z w",
         )
-    return np.asarray(scipy.spatial.transform.Rotation.from_quat(quaternions).as_matrix())
+    return Poses.of_quaternions(quaternions, np.zeros(3)).R
 
 
 # --- the start ------------------------------------------------------------------------------------
@@ -239,8 +309,7 @@ def _start_time(path: Path, seconds: float, t_ns: Times) -> int:
         raise ForeignFileError(
             path,
             f"init is of {seconds:.6f} s, the readings of {t_ns[0] * 1e-9:.6f} to "
-            f"{t_ns[-1] * 1e-9:.6f} s",
-            expected="a state within them is expected",
+            f"{t_ns[-1] * 1e-9:.6f} s; a state within them is expected",
         )
     return nearest if abs(nearest - told) <= SAME_TIME_NS else told
 
@@ -276,20 +345,18 @@ NOISES = {  # by name in a HEADER, the name in calib
 
 class _Calib(Named):
     def header(self, name: str) -> Header:
-        fx, fy, cx, cy, baseline = (
-            self.number(key) for key in ("fx", "fy", "cx", "cy", "baseline_m")
-        )
+        four, baseline = intrinsics(self, "fx", "fy", "cx", "cy"), self.number("baseline_m")
         T_CB = se3.inverse(self._extrinsic(baseline))
-        if self._number_or_0("cam_imu_time_offset_s"):
+        if self.number("cam_imu_time_offset_s", 0.0):
             raise self._wrong("cam_imu_time_offset_s", "0 is expected: times on one clock")
         return Header(
-            arrays.camera_of(self.path, fx, fy, cx, cy, baseline),
+            arrays.camera_of(self.path, *four, baseline),
             T_CB.R,
             T_CB.p,
             body_axes=body_axes(T_CB.R),
             twist_timing=TwistTiming.MID,
-            image_width_px=int(self._number_or_0("width")),
-            image_height_px=int(self._number_or_0("height")),
+            image_width_px=int(self.number("width", 0.0)),
+            image_height_px=int(self.number("height", 0.0)),
             noise=Noise(gravity=self._gravity(), **self._noises()),
             name=header_name(name),
             process=Process.IMU,
@@ -297,9 +364,6 @@ class _Calib(Named):
 
     def _wrong(self, key: str, expected: str) -> ForeignFileError:
         return self.error(key, self.get(key), expected)
-
-    def _number_or_0(self, key: str) -> float:
-        return self.number(key) if key in self else 0.0
 
     def _pose(self, key: str) -> Poses:
         matrix = self.array(key, 4, 4)
@@ -317,9 +381,8 @@ class _Calib(Named):
             if off > ALIGNED_M:
                 raise self._wrong(
                     "T_imu_cam1",
-                    f"that of a rectified pair is expected, baseline_m = {baseline:g} to the "
-                    "right of "
-                    "T_imu_cam0",
+                    f"that of a rectified pair is expected, baseline_m = {baseline:g} to the right "
+                    "of T_imu_cam0",
                 )
         return left
 

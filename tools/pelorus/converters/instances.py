@@ -45,7 +45,7 @@ def take(table: Table, asked: list[AskedRows]) -> None:
         if not (cells == one.value).any():
             there = ", ".join(_first_values(cells))
             raise ForeignFileError(
-                table.path, f"no row has {one.column} = {one.value}", expected=f"there are: {there}"
+                table.path, f"no row has {one.column} = {one.value}; there are: {there}"
             )
         table.keep(cells == one.value)
     if asked or not table.has_times or not table.count:
@@ -114,8 +114,7 @@ def _require_one_sensor(table: Table, t_ns: NDArray[np.int64]) -> None:
     if within > UNLIKE * between:
         raise ForeignFileError(
             table.path,
-            f"{each} rows have one time and differ as those of {each} sensors",
-            expected="a column that tells the sensors apart is expected (--rows COLUMN=VALUE takes "
-            "one of "
-            "them), or a file for each",
+            f"{each} rows have one time and differ as those of {each} sensors; a column that tells "
+            "the sensors apart is expected (--rows COLUMN=VALUE takes one of them), or a file for "
+            "each",
         )

@@ -8,7 +8,7 @@ odometry   sequences/NN/image_0, image_1 (or 2, 3), calib.txt, times.txt; poses/
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -26,7 +26,7 @@ from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
 from pelorus.program.console import progress
 from pelorus.rig import read as rig_files
-from pelorus.rig.lens import Lens, LensModel
+from pelorus.rig.lens import Lens, LensModel, intrinsics_in
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rig import Rig
 from pelorus.tracking import images
@@ -51,19 +51,6 @@ class Made(NamedTuple):
     seed: int = 1
 
 
-@dataclass(frozen=True)
-class _Folder:
-    """The two cameras' folders, and their numbers in the calibration."""
-
-    path: Path
-    left: str
-    right: str
-
-    @property
-    def numbers(self) -> tuple[int, int]:
-        return int(self.left[-1]), int(self.right[-1])
-
-
 def is_raw(folder: Path) -> bool:
     """Returns whether it is a raw drive: these have inertial measurements in oxts."""
     return (folder / "oxts").is_dir()
@@ -82,19 +69,19 @@ def read(folder: Path, asked: Asked, made: Made) -> Streams:
 def _raw(folder: Path, asked: Asked) -> Streams:
     cameras = _cameras(folder, RAW_PAIRS)
     rig = _raw_rig(resolved(folder).parent, cameras)
-    pairs = images.pairs(folder / cameras.left / "data", folder / cameras.right / "data")
-    t_ns = _stamps(folder / cameras.left / "timestamps.txt", len(pairs))
+    pairs = images.pairs(cameras[0] / "data", cameras[1] / "data")
+    t_ns = _stamps(cameras[0] / "timestamps.txt", len(pairs))
     packets, oxts_t_ns = _oxts(folder / "oxts")
     truth = asked.truth or Trajectory(oxts_t_ns, _oxts_poses(packets))
     motion = asked.motion or _oxts_twists(folder / "oxts", oxts_t_ns, packets)
     return Streams(_calibrated(folder, rig, asked), _pictures(pairs, t_ns), motion, truth)
 
 
-def _raw_rig(date: Path, cameras: _Folder) -> Rig:
+def _raw_rig(date: Path, cameras: tuple[Path, Path]) -> Rig:
     """Returns the rig of the rectified pictures; the body is the OXTS unit: forward, left, up."""
     path = date / "calib_cam_to_cam.txt"
     cam = _KittiCalib(path)
-    first, second = cameras.numbers
+    first, second = (int(camera.name[-1]) for camera in cameras)
     P = [cam.array(f"P_rect_{k:02d}", 3, 4) for k in (first, second)]
     size = cam.array(f"S_rect_{first:02d}", 2)
     R_rect = Poses(_near(path, "R_rect_00", cam.array("R_rect_00", 3, 3)), np.zeros(3))
@@ -140,9 +127,7 @@ def _stamps(path: Path, count: int) -> Times:
     lines = [line.strip() for line in foreign.text(path).splitlines() if line.strip()]
     if len(lines) != count:
         raise ForeignFileError(
-            path,
-            f"has {len(lines)} times",
-            expected=f"{count} are expected, one for each file in data",
+            path, f"has {len(lines)} times; {count} are expected, one for each file in data"
         )
     t_ns = np.array([_stamp(path, k, line) for k, line in enumerate(lines, 1)], np.int64)
     back = np.nonzero(np.diff(t_ns) <= 0)[0]
@@ -157,10 +142,8 @@ def _stamp(path: Path, line: int, words: str) -> int:
         seconds = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
         return int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
     except ValueError:
-        expected = "2011-09-30 12:40:25.069324302 or such is expected"
-        raise ForeignFileError(
-            path, f"{words[:40]!r} is no time", at=f"line {line}", expected=expected
-        ) from None
+        what = f"{words[:40]!r} is no time; 2011-09-30 12:40:25.069324302 or such is expected"
+        raise ForeignFileError(path, what, at=f"line {line}") from None
 
 
 # --- odometry -------------------------------------------------------------------------------------
@@ -170,9 +153,9 @@ def _odometry(folder: Path, asked: Asked, made: Made) -> Streams:
     cameras = _cameras(folder, ODOMETRY_PAIRS)
     path = folder / "calib.txt"
     calib = _KittiCalib(path)
-    P = [calib.array(f"P{k}", 3, 4) for k in cameras.numbers]
+    P = [calib.array(f"P{camera.name[-1]}", 3, 4) for camera in cameras]
     rig = replace(_rectified(path, P, (0, 0)), T_LB=Poses(AHEAD, np.zeros(3)))
-    pairs = images.pairs(folder / cameras.left, folder / cameras.right)
+    pairs = images.pairs(*cameras)
     t_ns = images.times(pairs, folder / "times.txt", None)
     calibrated = _calibrated(folder, rig, asked)
     truth = asked.truth or _poses(folder, t_ns, P[0], calibrated)
@@ -231,10 +214,11 @@ def _made_twists(where: Path, truth: Trajectory, made: Made) -> Twists:
 # --- both -----------------------------------------------------------------------------------------
 
 
-def _cameras(folder: Path, known: Sequence[tuple[str, str]]) -> _Folder:
+def _cameras(folder: Path, known: Sequence[tuple[str, str]]) -> tuple[Path, Path]:
+    """Returns the two cameras' folders, whose names end with their numbers."""
     for left, right in known:
         if (folder / left).is_dir() and (folder / right).is_dir():
-            return _Folder(folder, left, right)
+            return folder / left, folder / right
     words = " or ".join(" and ".join(pair) for pair in known)
     try:
         there = ", ".join(sorted(path.name for path in folder.iterdir())[:10]) or "none"
@@ -264,7 +248,7 @@ def _shift(P: Floats) -> Poses:
 
 
 def _rectified(path: Path, P: list[Floats], size: tuple[int, int]) -> Rig:
-    lenses = [Lens(LensModel.NONE, (p[0, 0], p[1, 1], p[0, 2], p[1, 2]), (), *size) for p in P]
+    lenses = [Lens(LensModel.NONE, intrinsics_in(p), (), *size) for p in P]
     baseline = P[0][0, 3] / P[0][0, 0] - P[1][0, 3] / P[1][0, 0]
     if min(P[0][0, 0], P[0][1, 1], baseline) <= 0:
         raise ForeignFileError(path, "has no positive focal length and baseline")
@@ -288,7 +272,7 @@ class _KittiCalib:
     def array(self, name: str, *shape: int) -> Floats:
         if name not in self._lines:
             there = ", ".join(self._lines) or "none"
-            raise ForeignFileError(self.path, f"lacks {name}", expected=f"there are: {there}")
+            raise ForeignFileError(self.path, f"lacks {name}; there are: {there}")
         try:
             numbers = np.array(self._lines[name], np.float64)
         except ValueError:
@@ -296,8 +280,8 @@ class _KittiCalib:
         if numbers.size != int(np.prod(shape)) or not np.isfinite(numbers).all():
             raise ForeignFileError(
                 self.path,
-                f"{name} has {numbers.size} numbers",
-                expected=f"{int(np.prod(shape))} finite ones are expected",
+                f"{name} has {numbers.size} numbers; {int(np.prod(shape))} finite ones are "
+                "expected",
             )
         return numbers.reshape(shape)
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from pelorus.converters.bag import NS, Bag
 from pelorus.io import arrays, foreign, stamps
-from pelorus.io.foreign import ForeignFileError
 from pelorus.math.motion import Times
 from pelorus.wire.layout import Floats
 
@@ -52,30 +51,28 @@ class Stamps(NamedTuple):
         return Stamps(self.t_ns[index], self.arrival_ns[index], numbers)
 
 
-def sound(
-    bag: Bag, topic: str, t_ns: Times, numbers: Floats, remarks: list[str]
-) -> NDArray[np.bool_]:
+def sound(bag: Bag, topic: str, t_ns: Times, numbers: Floats) -> NDArray[np.bool_]:
     """Returns which messages have a time and finite numbers; refuses too many bad ones."""
     timed = ~arrays.never_set(t_ns) if t_ns.any() else np.zeros(len(t_ns), np.bool_)
-    finite = np.isfinite(numbers).all(axis=1)
-    expected = "times in header.stamp are expected, or --stamps log: those of the messages' arrival"
-    leave_out(bag, topic, int((~timed).sum()), len(t_ns), "headers have no time", remarks, expected)
-    wrong = "messages hold a number that is not finite"
-    leave_out(bag, topic, int((~finite).sum()), len(t_ns), wrong, remarks)
+    finite = np.asarray(np.isfinite(numbers).all(axis=1), np.bool_)
+    instead = (
+        "; times in header.stamp are expected, or --stamps log: those of the messages' arrival"
+    )
+    leave_out(bag, topic, ~timed, "headers have no time", instead)
+    leave_out(bag, topic, ~finite, "messages hold a number that is not finite")
     return np.asarray(timed & finite)
 
 
-def leave_out(
-    bag: Bag, topic: str, bad: int, count: int, wrong: str, remarks: list[str], expected: str = ""
-) -> None:
-    """Remarks that `bad` of `count` messages are left out; refuses too many."""
-    if bad > foreign.BAD_ROWS_MAX * count:
-        raise ForeignFileError(bag.path, f"{bad} of {count} {wrong}", at=topic, expected=expected)
-    if bad:
-        remarks.append(f"{topic}: {bad} of {count} {wrong}: left out")
+def leave_out(bag: Bag, topic: str, bad: NDArray[np.bool_], wrong: str, instead: str = "") -> None:
+    """Remarks that the bad messages are left out; refuses too many, and says what to do instead."""
+    words = f"{bad.sum()} of {len(bad)} {wrong}"
+    if bad.sum() > foreign.BAD_ROWS_MAX * len(bad):
+        raise bag.error(topic, words + instead)
+    if bad.any():
+        bag.remarks.append(f"{topic}: {words}: left out")
 
 
-def spread(topic: str, given: Stamps, remarks: list[str]) -> Stamps:
+def spread(bag: Bag, topic: str, given: Stamps) -> Stamps:
     """Returns the readings with times of their own where a driver gives a batch one stamp."""
     t_ns, numbers = given.t_ns, given.numbers
     if numbers is None or (np.diff(t_ns) < 0).any():
@@ -84,14 +81,14 @@ def spread(topic: str, given: Stamps, remarks: list[str]) -> Stamps:
     if (np.diff(t_ns[once]) == 0).sum() <= foreign.BAD_ROWS_MAX * len(once):
         return given
     found = stamps.spread(t_ns[once])
-    remarks.append(
+    bag.remarks.append(
         f"{topic}: {found.batch} readings have one stamp (the median): spread over the time since "
         "the ones before, the last one at its stamp"
     )
     return given.at(once)._replace(t_ns=found.t_ns)
 
 
-def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray[np.intp]:
+def in_order(bag: Bag, topic: str, given: Stamps) -> NDArray[np.intp]:
     """Returns the messages to take, in the order of time; of those of one time the first.
 
     Refuses a clock that was set back.
@@ -102,18 +99,17 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
         until, later = (
             t / NS for t in (found.until_ns - bag.begins_ns, found.from_ns - bag.begins_ns)
         )
-        raise ForeignFileError(
-            bag.path,
-            f"stamps go back by {found.by_ns / NS:.4g} s at message {found.message}",
-            at=topic,
-            expected="was a clock set back, or are two recordings in one bag? Each must be "
-            f"converted alone: --until {math.floor(until * 1e3) / 1e3:.3f} takes the first, "
-            f"--from {math.ceil(later * 1e3) / 1e3:.3f} the second; if only the sensor's clock was "
-            "set, --stamps log is expected",
+        raise bag.error(
+            topic,
+            f"stamps go back by {found.by_ns / NS:.4g} s at message {found.message}; was a clock "
+            "set back, or are two recordings in one bag? Each must be converted alone: --until "
+            f"{math.floor(until * 1e3) / 1e3:.3f} takes the first, --from "
+            f"{math.ceil(later * 1e3) / 1e3:.3f} the second; if only the sensor's clock was set, "
+            "--stamps log is expected",
         )
     behind = np.maximum.accumulate(t_ns) - t_ns
     if behind.any():
-        remarks.append(
+        bag.remarks.append(
             f"{topic}: {int((behind > 0).sum())} messages come late, by up to "
             f"{behind.max() * 1e-6:.3g} ms: put in the order of their stamps"
         )
@@ -121,14 +117,15 @@ def in_order(bag: Bag, topic: str, given: Stamps, remarks: list[str]) -> NDArray
     if given.numbers is not None:
         other = len(_without_copies(given)) - len(times)
         if other > foreign.BAD_ROWS_MAX * len(t_ns):
-            raise ForeignFileError(
-                bag.path,
-                f"{other} of {len(t_ns)} messages have other numbers at the time of the one before",
-                at=topic,
-                expected="a stamp for each reading is expected, or --stamps log",
+            raise bag.error(
+                topic,
+                f"{other} of {len(t_ns)} messages have other numbers at the time of the one "
+                "before; a stamp for each reading is expected, or --stamps log",
             )
     if len(times) < len(t_ns):
-        remarks.append(f"{topic}: {len(t_ns) - len(times)} messages repeat a time and are left out")
+        bag.remarks.append(
+            f"{topic}: {len(t_ns) - len(times)} messages repeat a time and are left out"
+        )
     return first
 
 

@@ -52,7 +52,7 @@ def read(table: Table, sensor: SmallSensor) -> list[Reading]:
             value[:, k] = _within(table, column, VALUE_MAX)
     if not measured:
         expected = f"some of {', '.join(_wanted(sensor))} are expected"
-        raise ForeignFileError(path, "measures nothing", expected=expected)
+        raise ForeignFileError(path, f"measures nothing; {expected}")
     arm = np.zeros((len(t_ns), 3))
     if sensor.has_arm and any(table.has(name) for name in ARM):
         table.require(*ARM)
@@ -89,23 +89,11 @@ def _sigma_column(table: Table, sensor: SmallSensor, letter: str) -> str:
 
 def _sigma(table: Table, name: str) -> Floats:
     sigma = _within(table, name, SIGMA_MAX)
-    bad = np.nonzero(sigma <= 0)[0]
-    if len(bad):
-        raise ForeignFileError(
-            table.path,
-            f"{name} is {sigma[bad[0]]:g}, a positive number is expected",
-            at=table.row(int(bad[0])),
-        )
+    table.refuse(sigma <= 0, lambda k: f"{name} is {sigma[k]:g}, a positive number is expected")
     return sigma
 
 
 def _within(table: Table, name: str, most: float) -> Floats:
-    numbers = table.numbers(name)[:, 0]
-    beyond = np.nonzero(np.abs(numbers) > most)[0]
-    if len(beyond):
-        raise ForeignFileError(
-            table.path,
-            f"{name} is {numbers[beyond[0]]:g}, at most {most:g} is expected",
-            at=table.row(int(beyond[0])),
-        )
-    return numbers
+    x = table.numbers(name)[:, 0]
+    table.refuse(np.abs(x) > most, lambda k: f"{name} is {x[k]:g}, at most {most:g} is expected")
+    return x

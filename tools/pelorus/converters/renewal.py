@@ -91,8 +91,7 @@ def _no_fixed_points(source: Path, why: str) -> ForeignFileError:
     return ForeignFileError(
         source,
         "its observations are not those of points that stand still, seen from the true poses: "
-        f"{why}",
-        expected="a simulated recording is expected for --seed",
+        f"{why}; a simulated recording is expected for --seed",
     )
 
 
@@ -104,8 +103,8 @@ def _camera_poses(source: Path, recording: Recording) -> Poses:
     if len(mine) < len(recording.frame_t_ns):
         raise ForeignFileError(
             source,
-            f"{len(recording.frame_t_ns) - len(mine)} frames have no truth of their time",
-            expected="for --seed one each is expected",
+            f"{len(recording.frame_t_ns) - len(mine)} frames have no truth of their time; for "
+            "--seed one each is expected",
         )
     poses = se3.compose(recording.T_CB, se3.inverse(recording.truth.at(theirs)))
     return poses.at(recording.tracks.frame)

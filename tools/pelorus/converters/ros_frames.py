@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.converters.bag import Bag, require_messages
+from pelorus.converters.bag import Bag
 from pelorus.converters.order import Stamps, in_order, leave_out, sound
 from pelorus.converters.streams import Pictures, RawTracks
 from pelorus.converters.transforms import bare
@@ -129,19 +129,17 @@ def _partners(topics: list[str], words: tuple[tuple[str, str], ...]) -> list[tup
     return sorted(found)
 
 
-def read(
-    bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]
-) -> Pictures | RawTracks:
+def read(bag: Bag, cameras: Cameras, calibrated: Calibrated) -> Pictures | RawTracks:
     """Reads pictures, or tracks."""
     if cameras.tracks:
-        return _tracks(bag, cameras.tracks, calibrated, remarks)
-    return _pictures(bag, cameras, remarks)
+        return _tracks(bag, cameras.tracks, calibrated)
+    return _pictures(bag, cameras)
 
 
 # --- pictures -------------------------------------------------------------------------------------
 
 
-def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
+def _pictures(bag: Bag, cameras: Cameras) -> Pictures:
     """Returns pairs by the times of their headers: each left picture with the nearest right one."""
     topics = [cameras.left, cameras.right]
     stamps: dict[str, list[tuple[int, int]]] = {topic: [] for topic in topics}
@@ -151,35 +149,22 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
         deep = _of_16_bits(bag, found.topic, found.message, len(stamps[found.topic]))
         if deep is not None:
             brightest = max(brightest or 0, int(deep.max(initial=0)))
-    bits = 16 if brightest is None else images.bits_up_to(brightest, bag.path, remarks)
-    left, right = (_times(bag, topic, stamps[topic], remarks) for topic in topics)
+    bits = 16 if brightest is None else images.bits_up_to(brightest, bag.path, bag.remarks)
+    left, right = (
+        np.array(stamps[topic], np.int64)[_chosen(bag, topic, stamps[topic]), 0] for topic in topics
+    )
     pairs = _paired(bag, cameras, left, right)
-    remarks += apart_words(pairs)
-    alone = len(left) + len(right) - 2 * len(pairs)
-    if alone:
-        remarks.append(f"{alone} pictures have no partner and are left out")
-    where = bag.path / cameras.left.lstrip("/"), bag.path / cameras.right.lstrip("/")
-
-    def pixels() -> Iterator[tuple[Gray, Gray]]:
-        return _in_pairs(bag, cameras, pairs, bits)
-
-    return Pictures(where, pairs[:, 0], pixels)
+    where = bag.where(cameras.left), bag.where(cameras.right)
+    return Pictures(where, pairs[:, 0], lambda: _in_pairs(bag, cameras, pairs, bits))
 
 
-def _times(bag: Bag, topic: str, stamps: list[tuple[int, int]], remarks: list[str]) -> Times:
-    """Returns the times of the pictures that have one, in order."""
-    t_ns: Times = np.array([t for t, _ in stamps], np.int64)
-    return t_ns[_chosen(bag, topic, stamps, remarks)]
-
-
-def _chosen(
-    bag: Bag, topic: str, stamps: list[tuple[int, int]], remarks: list[str]
-) -> NDArray[np.intp]:
+def _chosen(bag: Bag, topic: str, stamps: list[tuple[int, int]]) -> NDArray[np.intp]:
     """Returns the messages that have a time, in its order, by stamps and arrivals."""
-    require_messages(bag, topic, len(stamps))
+    if not stamps:
+        raise bag.error(topic, "no message can be read")
     t_ns, arrival_ns = np.array(stamps, np.int64).T
-    good = np.nonzero(sound(bag, topic, t_ns, np.zeros((len(t_ns), 0)), remarks))[0]
-    return good[in_order(bag, topic, Stamps(t_ns, arrival_ns).at(good), remarks)]
+    good = np.nonzero(sound(bag, topic, t_ns, np.zeros((len(t_ns), 0))))[0]
+    return good[in_order(bag, topic, Stamps(t_ns, arrival_ns).at(good))]
 
 
 def _of_16_bits(bag: Bag, topic: str, message: Any, count: int) -> NDArray[Any] | None:
@@ -187,7 +172,7 @@ def _of_16_bits(bag: Bag, topic: str, message: Any, count: int) -> NDArray[Any] 
 
     Of packed ones only the first, second, fourth, ... are unpacked, for it takes time.
     """
-    where = bag.path / topic.lstrip("/")
+    where = bag.where(topic)
     if getattr(message, "encoding", "") in DEEP:
         return _deep(where, message)
     if not hasattr(message, "format") or count & (count - 1):
@@ -198,17 +183,19 @@ def _of_16_bits(bag: Bag, topic: str, message: Any, count: int) -> NDArray[Any] 
 
 def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
     """Returns (n, 2) times: two pictures of which each is the nearest to the other."""
-    pairs = images.together(left, right, cameras.apart_ns)
-    alone = len(left) + len(right) - 2 * len(pairs)
-    if images.too_many_alone(len(pairs), alone) or len(pairs) < images.PAIRS_MIN:
+    found = images.together(left, right, cameras.apart_ns)
+    count = len(found.pairs)
+    if images.too_many_alone(count, found.alone) or count < images.PAIRS_MIN:
         apart_ms = np.median(np.abs(right[motion.nearest(right, left)] - left)) * 1e-6
         raise PelorusError(
-            f"{bag.path}: of {len(left)} pictures of {cameras.left} {len(pairs)} have one of "
+            f"{bag.path}: of {len(left)} pictures of {cameras.left} {count} have one of "
             f"the {len(right)} of {cameras.right} within {cameras.apart_ns * 1e-6:g} ms (median "
             f"{apart_ms:.3g} ms); cameras that are triggered together are expected, or "
             "--pair-within MS"
         )
-    return np.stack((left[pairs[:, 0]], right[pairs[:, 1]]), axis=-1)
+    pairs = np.stack((left[found.pairs[:, 0]], right[found.pairs[:, 1]]), axis=-1)
+    bag.remarks += [*apart_words(pairs), *found.remarks]
+    return pairs
 
 
 def apart_words(pairs: Times) -> list[str]:
@@ -235,7 +222,7 @@ def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[t
     for topic, t_ns, message, _ in bag.messages([cameras.left, cameras.right]):
         if t_ns not in wanted[topic] or t_ns in waiting[topic]:
             continue
-        waiting[topic][t_ns] = gray(bag.path / topic.lstrip("/"), message, bits)
+        waiting[topic][t_ns] = gray(bag.where(topic), message, bits)
         if len(waiting[topic]) > WAITING_MAX:
             raise PelorusError(f"{bag.path}: {topic}: pictures lie in no order of time")
         while first in waiting[cameras.left] and second in waiting[cameras.right]:
@@ -257,9 +244,7 @@ def gray(where: Path, message: Any, bits: int = 16) -> Gray:
     channels = CHANNELS.get(encoding, 1)
     if encoding not in (*PLAIN, *DEEP, *TO_GRAY):
         known = ", ".join((*PLAIN, *DEEP, *TO_GRAY))
-        raise ForeignFileError(
-            where, f"pictures are encoded as {encoding}", expected=f"{known} are expected"
-        )
+        raise ForeignFileError(where, f"pictures are encoded as {encoding}; {known} are expected")
     if encoding in DEEP:
         return np.asarray(_deep(where, message) >> (bits - 8), np.uint8)
     plain = _lines(where, message, channels)
@@ -290,26 +275,25 @@ def _deep(where: Path, message: Any) -> NDArray[np.uint16]:
 # --- tracks ---------------------------------------------------------------------------------------
 
 
-def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) -> RawTracks:
+def _tracks(bag: Bag, topic: str, calibrated: Calibrated) -> RawTracks:
     if topic not in bag.types:
         raise PelorusError(f"{bag.path}: has no topic {topic}; {bag.listing()}")
-    where = bag.path / topic.lstrip("/")
+    where = bag.where(topic)
     stamps, messages = [], []
     for found in progress(bag.written([topic]), f"reading {topic}", bag.count([topic])):
         stamps.append((found.t_ns, found.arrival_ns))
         messages.append(observations(where, found.message, calibrated))
-    order = _chosen(bag, topic, stamps, remarks)
+    order = _chosen(bag, topic, stamps)
     rows = [messages[k] for k in order]
     table = np.concatenate(rows)
     broken = ~np.isfinite(table).all(axis=1)
-    if broken.any():
-        leave_out(bag, topic, int(broken.sum()), len(table), "observations are not finite", remarks)
+    leave_out(bag, topic, broken, "observations are not finite")
     frame = np.repeat(np.arange(len(rows)), [len(one) for one in rows])[~broken]
     table, times = table[~broken], np.array(stamps, np.int64)[order, 0]
     tracks = Tracks.from_rows(len(times), frame, table[:, 0].astype(np.int64), table[:, 1:])
     tracks.check(bag.path)
-    if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
-        raise ForeignFileError(bag.path, "an id stands twice in a message", at=topic)
+    if tracks.twice() is not None:
+        raise bag.error(topic, "an id stands twice in a message")
     return RawTracks(where, times, tracks)
 
 
@@ -331,9 +315,9 @@ def observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
     if lacking:
         raise ForeignFileError(
             where,
-            f"holds no tracks: lacks {', '.join(lacking)}",
-            expected=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is expected, or features of "
-            f"{', '.join(RAYS)}; there are: {', '.join(columns) or 'none of them'}",
+            f"holds no tracks: lacks {', '.join(lacking)}; {CLOUD2} or {CLOUD} with "
+            f"{', '.join(FIELDS)} is expected, or features of {', '.join(RAYS)}; there are: "
+            f"{', '.join(columns) or 'none of them'}",
         )
     return np.stack([columns[name] for name in FIELDS], axis=-1)
 
@@ -408,5 +392,5 @@ def _info(bag: Bag, topic: str) -> Info:
         for name in "kdrp"
     )
     matrices = K.reshape(3, 3), D, R.reshape(3, 3), P.reshape(3, 4)
-    where = bag.path / topic.lstrip("/")
+    where = bag.where(topic)
     return Info(where, "", *matrices, info.distortion_model, info.width, info.height)

@@ -11,17 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.converters import earth_start, full_scale, raw_tracks, repeated, twist_noise
-from pelorus.converters.expected import Expected
+from pelorus.converters import earth_start, full_scale, repeated, twist_noise
 from pelorus.errors import PelorusError
-from pelorus.eyes.front_end import Eyes, Shown, track
-from pelorus.faults import stale
+from pelorus.faults import resolution, stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import findings_of, mend
 from pelorus.io.foreign import ForeignFileError
@@ -30,19 +27,15 @@ from pelorus.io.tracks import Tracks
 from pelorus.io.trajectory import Trajectory, filled
 from pelorus.math.inertial import NO_READINGS, Inertial
 from pelorus.math.motion import Times
-from pelorus.math.se3 import Poses
-from pelorus.program.console import progress
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
-from pelorus.rig.rectification import Gray
-from pelorus.tracking import images
+from pelorus.rig.rectification import Gray, Rectification
+from pelorus.rig.rig import Rig
 from pelorus.wire.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
 from pelorus.wire.layout import Floats
 
 FORCES_MPS2 = (5.0, 15.0)
-BLIND_VELOCITY_MPS = (
-    0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
-)
+BLIND_VELOCITY_MPS = 0.2  # sigma along an axis that nothing measures: wheels do not slide
 RESOLUTIONS = 8  # stamps may be rounded to 10 ms, and to each finer power of ten
 PAUSE_STEPS = 5.0  # a longer gap, in periods, is a pause, across which nothing is interpolated
 # The fastest turn of a robot while its tracks hold, about an axis that nothing measures: the
@@ -83,6 +76,10 @@ class Readings:
     where: Path
     inertial: Inertial
     frame: str = ""
+
+    @property
+    def t_ns(self) -> Times:
+        return self.inertial.t_ns
 
 
 @dataclass(frozen=True)
@@ -156,23 +153,18 @@ def _made(streams: Streams) -> tuple[Recording, list[Finding]]:
     t_ns = frames.t_ns
     if calibrated.rig is not None:
         t_ns = calibrated.rig.on_body_clock(t_ns)
-    _require_overlap(frames, t_ns, streams.motion)
+    where = frames.where if isinstance(frames, RawTracks) else frames.where[0]
+    require_overlap(where, t_ns, streams.motion)
     truth = None if streams.truth is None else at_frames(streams.truth, t_ns, streams.motion)
     if isinstance(frames, Pictures):
+        from pelorus.converters.expected import tracked  # noqa: PLC0415 - it loads the library
+
         repeats = repeated.Repeats(_moves(streams.motion, t_ns), t_ns)
-        header, tracks = _tracked(streams, frames, t_ns, repeats)
+        header, tracks = tracked(streams, frames, t_ns, repeats)
         t_ns = repeats.kept_t_ns
         found = repeats.findings
     else:
-        header, tracks, rig = calibrated.header, frames.tracks, calibrated.rig
-        sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
-        if len(sizes) == 1:
-            raw_tracks.require_resolution(frames.where, tracks, sizes[0])
-        if rig is not None:
-            rig = raw_tracks.of_pixels(rig, tracks)
-            rectification = rig.rectification()
-            header = rig.header(rectification, header.name)
-            tracks = raw_tracks.rectified(tracks, rectification, frames.where)
+        header, tracks = _of_raw(calibrated, frames)
         moves = _moves(streams.motion, t_ns)
         t_ns, tracks, found = repeated.left_out(moves, t_ns, tracks, header.camera)
     made, more = of_drive(header, streams, t_ns, tracks, truth)
@@ -262,10 +254,9 @@ def _require_gravity(readings: Readings) -> None:
     if not FORCES_MPS2[0] <= usual <= FORCES_MPS2[1]:
         raise ForeignFileError(
             readings.where,
-            f"the specific force is {usual:.3g} m/s^2 in the median",
-            expected="about 9.81 is expected: is it in g (--columns ax=COLUMN:g and so on), or has "
-            "gravity "
-            "been taken away? Raw readings are expected",
+            f"the specific force is {usual:.3g} m/s^2 in the median; about 9.81 is expected: is it "
+            "in g (--columns ax=COLUMN:g and so on), or has gravity been taken away? Raw readings "
+            "are expected",
         )
 
 
@@ -299,11 +290,7 @@ def with_gyro(
     t = twists.t_ns
     inside = (t >= gyro_t_ns[0]) & (t <= gyro_t_ns[-1])
     if inside.sum() < 2:
-        raise ForeignFileError(
-            where,
-            f"spans {gyro_t_ns[0]} to {gyro_t_ns[-1]} ns, {twists.where} {t[0]} to {t[-1]} ns: "
-            "they do not overlap",
-        )
+        raise _apart(where, gyro_t_ns, twists.where, t)
     t = t[inside]
     cuts = _held_between(t, timing)
     steps = np.diff(gyro_t_ns) * 1e-9
@@ -336,11 +323,7 @@ def joined(
     after = np.clip(np.searchsorted(own, t_ns), 1, max(len(own) - 1, 1))
     inside = (t_ns >= own[0]) & (t_ns <= own[-1])
     if len(own) < 2 or inside.sum() < 2:
-        raise ForeignFileError(
-            accel,
-            f"spans {forces[0][0]} to {forces[0][-1]} ns, {gyro} {rates[0][0]} to "
-            f"{rates[0][-1]} ns: they do not overlap",
-        )
+        raise _apart(accel, forces[0], gyro, rates[0])
     steps = np.diff(own)
     near = steps[after - 1] <= PAUSE_STEPS * np.median(steps)
     kept = inside & near
@@ -364,10 +347,6 @@ def _held_between(t_ns: Times, timing: TwistTiming) -> Times:
     return np.concatenate((t_ns[:1], half_way, t_ns[-1:]))
 
 
-def _times_of(motion: Twists | Readings) -> Times:
-    return motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
-
-
 def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
     """Returns whether the body moves from frame to frame; by an IMU, whether it turns."""
     if isinstance(motion, Twists):
@@ -376,59 +355,64 @@ def _moves(motion: Twists | Readings, t_ns: Times) -> NDArray[np.bool_]:
     return repeated.moves(t_ns, motion.inertial.t_ns, w - np.median(w, axis=0), None)
 
 
-def _require_overlap(frames: Pictures | RawTracks, t_ns: Times, motion: Twists | Readings) -> None:
-    own = _times_of(motion)
+def require_overlap(where: Path, t_ns: Times, motion: Twists | Readings) -> None:
+    """Raises ForeignFileError where the times of a file are not while the body is moved."""
+    own = motion.t_ns
     if t_ns[-1] < own[0] or own[-1] < t_ns[0]:
-        where = frames.where if isinstance(frames, RawTracks) else frames.where[0]
+        raise _apart(where, t_ns, motion.where, own)
+
+
+def _apart(where: Path, t_ns: Times, other: Path, own: Times) -> ForeignFileError:
+    spans = f"spans {t_ns[0]} to {t_ns[-1]} ns, {other} {own[0]} to {own[-1]} ns"
+    return ForeignFileError(where, f"{spans}: they do not overlap")
+
+
+# --- tracks in the pixels of the cameras ----------------------------------------------------------
+
+
+def _of_raw(calibrated: Calibrated, frames: RawTracks) -> tuple[Header, Tracks]:
+    """Returns the HEADER of the rectified camera, and the tracks in its pixels."""
+    header, tracks, rig = calibrated.header, frames.tracks, calibrated.rig
+    if len(calibrated.sizes) == 1 and (
+        wrong := resolution.beyond(tracks.pixels, *calibrated.sizes)
+    ):
         raise ForeignFileError(
-            where,
-            f"spans {t_ns[0]} to {t_ns[-1]} ns, {motion.where} {own[0]} to {own[-1]} ns: "
-            "they do not overlap",
+            frames.where,
+            f"{wrong}; the calibration of these pictures, or pixels of those, are expected",
         )
+    if rig is None:
+        return header, tracks
+    rig = _at_resolution(rig, tracks)
+    rectification = rig.rectification()
+    return rig.header(rectification, header.name), _rectified(tracks, rectification, frames.where)
 
 
-# --- frames ---------------------------------------------------------------------------------------
+def _at_resolution(rig: Rig, tracks: Tracks) -> Rig:
+    """Returns the rig at the smallest of its resolutions that holds all pixels."""
+    if not rig.others or not len(tracks):
+        return rig
+    most = tracks.pixels.max(axis=0).reshape(2, 2).max(axis=0)
+    holding = [size for size in rig.sizes if (most < size).all()]
+    if not holding:
+        raise ForeignFileError(
+            rig.path,
+            f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution; the "
+            "calibration of these pictures is needed",
+        )
+    return rig.of_size(*min(holding, key=np.prod))
 
 
-def _expected(streams: Streams, header: Header, t_ns: Times) -> Expected:
-    """Returns how points of pictures of these times are expected to have moved."""
-    T_CB, motion = Poses(header.R_CB, header.t_CB_m), streams.motion
-    if isinstance(motion, Twists):
-        moved = motion.t_ns, motion.v_B_mps, motion.w_B_radps
-        return Expected.by_twists(t_ns, T_CB, moved, motion.measured, header.twist_timing)
-    return Expected.by_gyro(t_ns, T_CB, streams.calibrated.imu.correction.of(motion.inertial))
-
-
-def _tracked(
-    streams: Streams, pictures: Pictures, t_ns: Times, repeats: repeated.Repeats
-) -> tuple[Header, Tracks]:
-    """Returns the HEADER of the rectified pictures, and the tracks in them."""
-    calibrated = streams.calibrated
-    pairs = pictures.read()
-    first = next(pairs)
-    height, width = first[0].shape
-    header, rig = calibrated.header, calibrated.rig
-    sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
-    if (width, height) not in sizes:
-        images.require_size(pictures.where[0], first[0].shape, sizes[0])
-    if rig is not None:
-        rig = rig.of_size(width, height)
-        header = rig.header(rig.rectification(), header.name)
-    header = replace(header, image_width_px=width, image_height_px=height)
-
-    def shown() -> Iterator[Shown]:
-        last = None
-        for k, pair in enumerate(chain((first,), pairs)):
-            for where, picture in zip(pictures.where, pair, strict=True):
-                images.require_alike(where, picture, first[0])
-            if not repeats.leaves_out(*pair):
-                motion = None if last is None else expected.between(last, k)
-                yield Shown(int(t_ns[k]), *pair, motion)
-                last = k
-
-    expected = _expected(streams, header, t_ns)
-    eyes = Eyes(header.camera, (width, height), rig)
-    return header, track(progress(shown(), "tracking", len(pictures.t_ns)), eyes, pictures.where)
+def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tracks:
+    """Rectifies the cameras' pixels; leaves out those that no ray of the lens reaches."""
+    pixels = rectification.pixels(tracks.pixels)
+    good = np.isfinite(pixels).all(axis=1)
+    if not good.any():
+        raise ForeignFileError(
+            source,
+            "no pixel is one of the calibration's lenses; pixels as the cameras took them are "
+            "expected, of the calibration's resolution",
+        )
+    return replace(tracks, pixels=pixels).at(np.nonzero(good)[0])
 
 
 # --- truth ----------------------------------------------------------------------------------------
@@ -441,7 +425,7 @@ def at_frames(truth: Trajectory, frame_t_ns: Times, motion: Twists | Readings) -
     The filter is compared at the frames, and starts from the first pose. What a motion capture saw
     before or after the sensors ran is not of the drive.
     """
-    t_ns, own = truth.t_ns, _times_of(motion)
+    t_ns, own = truth.t_ns, motion.t_ns
     if frame_t_ns[-1] < t_ns[0] or t_ns[-1] < frame_t_ns[0]:
         raise PelorusError(
             f"the truth spans {t_ns[0]} to {t_ns[-1]} ns, the frames {frame_t_ns[0]} to "

@@ -7,16 +7,17 @@ parent, so two frames are joined by one chain or by none.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import scipy
 
-from pelorus.converters.bag import Bag
 from pelorus.errors import PelorusError
 from pelorus.math import se3
 from pelorus.math.se3 import IDENTITY, Poses
 from pelorus.program.console import progress
+
+if TYPE_CHECKING:
+    from pelorus.converters.bag import Bag
 
 TF = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 STATIC = "tf_static"
@@ -84,9 +85,7 @@ class Tree:
         norm = np.linalg.norm(quaternion)
         if child == parent or not np.isfinite(p).all() or not 0.9 < norm < 1.1:
             return
-        link = FrameLink(
-            parent, Poses(scipy.spatial.transform.Rotation.from_quat(quaternion).as_matrix(), p)
-        )
+        link = FrameLink(parent, Poses.of_quaternions(quaternion, p))
         known = self.links.setdefault(child, link)
         if known.parent == parent and _same(known.T, link.T):
             return
@@ -105,9 +104,8 @@ class Tree:
         if meeting is None:
             raise PelorusError(
                 f"{self.bag.path}: no chain of transforms joins {first!r} and {last!r}: they end "
-                f"at {up[-1]!r} and at {down[-1]!r}; --extrinsic FILE is expected, or "
-                "--body-frame and "
-                f"--camera-frame, one of {self.listing}"
+                f"at {up[-1]!r} and at {down[-1]!r}; --extrinsic FILE is expected, or --body-frame "
+                f"and --camera-frame, one of {self.listing}"
             )
         up, down = up[: up.index(meeting) + 1], down[: down.index(meeting)]
         for child in (*up[:-1], *down):

@@ -34,10 +34,8 @@ def in_body(
     if poses is None:
         raise ForeignFileError(
             twists.where,
-            f"has no orientation, and --twist-in {asked.value} turns by it",
-            expected="nav_msgs/Odometry with its pose is expected, or CSV with qx, qy, qz, qw (and "
-            "px_m, "
-            "py_m, pz_m)",
+            f"has no orientation, and --twist-in {asked.value} turns by it; nav_msgs/Odometry with "
+            "its pose is expected, or CSV with qx, qy, qz, qw (and px_m, py_m, pz_m)",
         )
     if not twists.is_whole:
         raise PelorusError(f"--twist-in {asked.value}: all six velocities are expected")
@@ -46,9 +44,7 @@ def in_body(
         asked = _axes_by_poses(twists, poses, remarks) if has_place else TwistIn.BODY
     if asked is TwistIn.POSES:
         if not has_place:
-            raise ForeignFileError(
-                twists.where, "has no places", expected="px_m, py_m, pz_m are expected"
-            )
+            raise ForeignFileError(twists.where, "has no places; px_m, py_m, pz_m are expected")
         return _of_poses(twists, poses, timing)
     v, w = twists.v_B_mps, twists.w_B_radps
     if asked in (TwistIn.WORLD, TwistIn.WORLD_VELOCITY):

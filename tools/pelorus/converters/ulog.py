@@ -33,9 +33,7 @@ def is_one(path: Path) -> bool:
 def table(path: Path, file: str) -> Table:
     """Returns a table with t_us, ax_mps2, wx_radps and so on; `file` is the option's name."""
     if file not in ("imu", "gyro"):
-        raise ForeignFileError(
-            path, "is a log of PX4", expected="it is read as --imu or --gyro alone"
-        )
+        raise ForeignFileError(path, "is a log of PX4; it is read as --imu or --gyro alone")
     with extra("pyulog"):
         from pyulog import ULog  # noqa: PLC0415 - an extra
     try:

@@ -13,16 +13,12 @@ from itertools import groupby
 
 import numpy as np
 
-from pelorus.io.small_sensors import SMALL_SENSORS
+from pelorus.io.small_sensors import STANDSTILL, WHEEL
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
 from pelorus.wire.frames import Reading
 from pelorus.wire.layout import Floats
 
-WHEEL, STANDSTILL = (
-    next(sensor for sensor in SMALL_SENSORS if sensor.name == name)
-    for name in ("wheel", "standstill")
-)
 # Encoders that count nothing for so long have moved less than a count, some mm, which gives the
 # sigma of a standstill. So much is left out at either end, where the body still settles.
 REST_S = 0.5

@@ -32,9 +32,7 @@ def recording(found: Streams) -> tuple[Recording, list[Finding]]:
     first = next(frames.read())[0]
     height, width = first.shape
     header, rig, message = calibrated.header, calibrated.rig, None
-    sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
-    if (width, height) not in sizes:
-        images.require_size(frames.where[0], first.shape, sizes[0])
+    images.require_size(frames.where[0], first.shape, calibrated.sizes)
     t_ns = frames.t_ns
     if rig is not None:
         t_ns = rig.on_body_clock(t_ns)
@@ -60,8 +58,8 @@ def _cameras(rig: Rig, header: Header) -> tuple[RigMessage, Header]:
     if rig.T_LB is None:
         raise ForeignFileError(
             rig.path,
-            "does not say where the camera sits on the body",
-            expected="--extrinsic FILE is expected: JSON with R_CB and t_CB_m",
+            "does not say where the camera sits on the body; --extrinsic FILE is expected: JSON "
+            "with R_CB and t_CB_m",
         )
     seen = Tracker(rig).calibration(rig.T_LB.R, rig.T_LB.p)
     camera = Camera(seen.fx_px, seen.fy_px, seen.cx_px, seen.cy_px, seen.baseline_m)

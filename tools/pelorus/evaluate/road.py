@@ -43,8 +43,8 @@ def read_road(path: Path) -> Floats:
     if len(rows) < 2 or columns < 2:
         raise ForeignFileError(
             path,
-            f"is no road: {len(rows)} rows of {columns} numbers",
-            expected="at least two rows arc_m,x_m,y_m are expected",
+            f"is no road: {len(rows)} rows of {columns} numbers; at least two rows arc_m,x_m,y_m "
+            "are expected",
         )
     return foreign.numbers(path, rows)[:, -2:]
 

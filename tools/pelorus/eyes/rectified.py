@@ -34,6 +34,8 @@ ROW_GAP_PX = 1.5  # of a point in a rectified pair
 LEFT_PX = 3  # so much further right a far point may be
 REACH_SHARE = 6  # of the width: the largest disparity that is searched, as eyes do
 ROWS_PX = 32  # up and down; a point of a pair that is nearly rectified is within
+# Of the places that are searched those of a rectified pair.
+PAIR_SHARE = (2 * int(ROW_GAP_PX) + 1) / (2 * ROWS_PX + 1) * 0.5
 SIGMAS = 3.0
 CHANCE = 1.3e-3  # as far off as three sigma, on one side
 
@@ -75,7 +77,6 @@ class Evidence:
     chance: Seen = field(default_factory=Seen)
     _frames: int = 0
     _before: Gray | None = None
-    _share: float = 1.0  # of the places that are searched: those of a rectified pair
 
     def add(self, left: Gray, right: Gray) -> None:
         """The next frame."""
@@ -101,7 +102,6 @@ class Evidence:
         mirrored = np.ascontiguousarray(np.flipud(right))
         rows, columns = left.shape
         reach = self.disparity_max_px or columns // REACH_SHARE
-        self._share = (2 * int(ROW_GAP_PX) + 1) / (2 * ROWS_PX + 1) * 0.5
         for u, v in np.round(_corners(left)).astype(int).tolist():
             inside = HALF <= u < columns - HALF and HALF <= v < rows - HALF
             if not inside or not all(_most_alike(left, p, (u, v), reach) for p in (left, before)):
@@ -128,12 +128,11 @@ class Evidence:
                 "(T_cn_cnm1; R, T) the inverse?"
             )
         found = seen.as_due + seen.swapped + seen.elsewhere
-        if _more(self.corners, found) and _tail(seen.as_due, found, self._share) > CHANCE:
+        if _more(self.corners, found) and _tail(seen.as_due, found, PAIR_SHARE) > CHANCE:
             raise PelorusError(
                 f"{shows} {seen.as_due} in the same row, no more than by chance; pictures of a "
-                "rectified pair that were taken together are expected (is one camera covered, "
-                "is the "
-                "largest disparity too small?)"
+                "rectified pair that were taken together are expected (is one camera covered, is "
+                "the largest disparity too small?)"
             )
 
 

@@ -54,7 +54,7 @@ class Arrays:
                 return key
         there = ", ".join(sorted(self._arrays)) or "none"
         raise ForeignFileError(
-            self.path, f"lacks the array {' or '.join(keys)}", expected=f"there are: {there}"
+            self.path, f"lacks the array {' or '.join(keys)}; there are: {there}"
         )
 
     def get(self, *keys: str, shape: tuple[int | None, ...] | None = None) -> Floats:
@@ -67,7 +67,7 @@ class Arrays:
         if shape is not None and not _fits(array.shape, shape):
             expected = " x ".join("n" if size is None else str(size) for size in shape)
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", expected=f"{expected} is expected"
+                self.path, f"{key} has the shape {array.shape}; {expected} is expected"
             )
         if not np.isfinite(array).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -79,9 +79,7 @@ class Arrays:
         array = self._arrays[self.one_of(key)]
         if array.size != 1 or array.dtype.kind not in "US":
             raise ForeignFileError(
-                self.path,
-                f"{key} is {array.size} of type {array.dtype}",
-                expected="one text is expected",
+                self.path, f"{key} is {array.size} of type {array.dtype}; one text is expected"
             )
         item = array.reshape(()).item()
         return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
@@ -90,7 +88,7 @@ class Arrays:
         array = self.get(key)
         if array.size != 1:
             raise ForeignFileError(
-                self.path, f"{key} has the shape {array.shape}", expected="one number is expected"
+                self.path, f"{key} has the shape {array.shape}; one number is expected"
             )
         return float(array.reshape(()))
 
@@ -121,10 +119,9 @@ def require_baseline(path: Path, length_m: float) -> None:
     if not BASELINES_M[0] <= length_m <= BASELINES_M[1]:
         raise ForeignFileError(
             path,
-            f"the cameras stand {length_m:g} apart",
-            expected=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are expected: are these "
-            "millimetres, or "
-            "squares of the board? Divide so that it is in metres",
+            f"the cameras stand {length_m:g} apart; {BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are "
+            "expected: are these millimetres, or squares of the board? Divide so that it is in "
+            "metres",
         )
 
 
@@ -158,8 +155,8 @@ def check_seconds(path: Path, what: str, numbers: Floats, unit_ns: float = 1e9) 
         guess = f"; are they {finer[0]}? (of a CSV: --columns t={what}:{finer[0]})" if finer else ""
         raise ForeignFileError(
             path,
-            f"{what} spans {numbers.min():g} to {numbers.max():g}",
-            expected=f"{name} from 0 to {most:g} are expected{guess if numbers.min() >= 0 else ''}",
+            f"{what} spans {numbers.min():g} to {numbers.max():g}; {name} from 0 to {most:g} are "
+            f"expected{guess if numbers.min() >= 0 else ''}",
         )
 
 

@@ -46,15 +46,14 @@ ArraysByName = dict[str, NDArray[np.generic]]
 
 
 class ForeignFileError(PelorusError):
-    """A file is not what it should be: which one, where in it, what is wrong, what would be right.
-
-    `expected` is a sentence of its own: "12 numbers are expected".
+    """A file is not what it should be: which one, where in it, what is wrong, what would be right:
+    "has 3 numbers; 12 are expected".
     """
 
-    def __init__(self, path: Path, wrong: str, *, at: str = "", expected: str = "") -> None:
-        self.path, self.at, self.wrong, self.expected = path, at, wrong, expected
-        place = f"{path}: {at}" if at else str(path)
-        super().__init__(f"{place}: {wrong}; {expected}" if expected else f"{place}: {wrong}")
+    def __init__(self, path: Path, what: str, *, at: str = "") -> None:
+        self.path, self.at = path, at
+        self.wrong, _, self.expected = what.partition("; ")
+        super().__init__(f"{path}: {at}: {what}" if at else f"{path}: {what}")
 
 
 # --- bytes and text -------------------------------------------------------------------------------
@@ -68,9 +67,7 @@ def content(path: Path, most: int) -> bytes:
             while piece := stream.read(PIECE_BYTES):
                 size += len(piece)
                 if size > most:
-                    raise ForeignFileError(
-                        path, "is too long", expected=f"at most {most} bytes are expected"
-                    )
+                    raise ForeignFileError(path, f"is too long; at most {most} bytes are expected")
                 pieces.append(piece)
     except OSError as error:
         raise ForeignFileError(path, f"cannot be read: {error.strerror}") from error
@@ -106,9 +103,7 @@ def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
     except UnicodeDecodeError as error:
         bad = error.start
     if bad >= 0:  # a zero, too: UTF-16 without a mark, or unwritten data
-        raise ForeignFileError(
-            path, "is no text", at=f"byte {bad}", expected="text in UTF-8 is expected"
-        )
+        raise ForeignFileError(path, "is no text; text in UTF-8 is expected", at=f"byte {bad}")
     return found
 
 
@@ -219,7 +214,7 @@ def _numbers(path: Path, given: list[Row], columns: int | None) -> Floats:
         at = f"line {line}"
         if len(cells) != expected:
             raise ForeignFileError(
-                path, f"has {len(cells)} numbers", at=at, expected=f"{expected} a row are expected"
+                path, f"has {len(cells)} numbers; {expected} a row are expected", at=at
             )
         if not all(map(is_number, cells)):
             raise ForeignFileError(path, "holds something that is no number", at=at)
@@ -255,23 +250,16 @@ def csv_rows(path: Path) -> Csv:
         table.insert(0, comments[-1])
         skipped -= 1
     if not table:
-        raise ForeignFileError(
-            path, "the file is empty", expected="a row of column names is expected"
-        )
+        raise ForeignFileError(path, "the file is empty; a row of column names is expected")
     names, below = table[0], table[1:]
-    by_semicolons = len(names) == 1 and ";" in names[0]
     _, more = _comments(below)
     first_row = skipped + more + 2
     for number, row in enumerate(below[more:], start=first_row):
         if len(row) != len(names):
-            raise ForeignFileError(
-                path,
-                f"has {len(row)} cells, the first row names {len(names)}",
-                at=f"row {number}",
-                expected="points in numbers, and commas between them, are expected"
-                if by_semicolons
-                else "",
-            )
+            wrong = f"has {len(row)} cells, the first row names {len(names)}"
+            if len(names) == 1 and ";" in names[0]:
+                wrong += "; points in numbers, and commas between them, are expected"
+            raise ForeignFileError(path, wrong, at=f"row {number}")
     return Csv(names, below[more:], first_row)
 
 
@@ -315,15 +303,12 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
         json.dumps(found, ensure_ascii=False).encode("utf-8")
     except RecursionError:
         raise ForeignFileError(
-            path,
-            "is nested too deep",
-            expected="an object with numbers, words and lists of them is expected",
+            path, "is nested too deep; an object with numbers, words and lists of them is expected"
         ) from None
     except UnicodeEncodeError:
         raise ForeignFileError(
             path,
-            "holds half of a surrogate pair (\\ud800 to \\udfff)",
-            expected="whole characters are expected",
+            "holds half of a surrogate pair (\\ud800 to \\udfff); whole characters are expected",
         ) from None
     except json.JSONDecodeError as error:
         raise ForeignFileError(
@@ -332,9 +317,7 @@ def json_words(path: Path, words: str) -> dict[str, Any]:
     except ValueError as error:
         raise ForeignFileError(path, str(error)) from None
     if not isinstance(found, dict):
-        raise ForeignFileError(
-            path, "is JSON without names", expected="an object with names is expected"
-        )
+        raise ForeignFileError(path, "is JSON without names; an object with names is expected")
     return found
 
 
@@ -386,9 +369,7 @@ def yaml_object(path: Path) -> dict[str, Any]:
 def yaml_words(path: Path, words: str) -> dict[str, Any]:
     """Parses the same from the file's text."""
     if len(words) > YAML_BYTES_MAX:
-        raise ForeignFileError(
-            path, "is too long", expected=f"at most {YAML_BYTES_MAX} bytes are expected"
-        )
+        raise ForeignFileError(path, f"is too long; at most {YAML_BYTES_MAX} bytes are expected")
     _require_shallow(path, words)
     yaml = YAML(typ="safe", pure=True)
     yaml.Constructor = _Constructor
@@ -403,9 +384,7 @@ def yaml_words(path: Path, words: str) -> dict[str, Any]:
     except (YAMLError, RecursionError, ValueError) as error:
         raise ForeignFileError(path, f"is no YAML: {_first_line(error)}") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
-        raise ForeignFileError(
-            path, "is YAML without names", expected="names with values are expected"
-        )
+        raise ForeignFileError(path, "is YAML without names; names with values are expected")
     return found
 
 
@@ -421,9 +400,7 @@ def _require_shallow(path: Path, words: str) -> None:
     deepest = max(accumulate((c in "[{") - (c in "]}") for c in words), default=0)
     if deepest > YAML_DEPTH_MAX:
         raise ForeignFileError(
-            path,
-            "is nested too deep",
-            expected="names with numbers, words and lists of them are expected",
+            path, "is nested too deep; names with numbers, words and lists of them are expected"
         )
 
 
@@ -435,9 +412,9 @@ def npz(path: Path) -> ArraysByName:
     require_file(path)
     expected = "a .npz file (a zip of numpy arrays, as np.savez makes one) is expected"
     if beginning(path).startswith(NPY_MAGIC):
-        raise ForeignFileError(path, "is a lone array (.npy)", expected=expected)
+        raise ForeignFileError(path, f"is a lone array (.npy); {expected}")
     if not zipfile.is_zipfile(path):
-        raise ForeignFileError(path, "is no .npz file, or its end is missing", expected=expected)
+        raise ForeignFileError(path, f"is no .npz file, or its end is missing; {expected}")
     try:
         _require_unpackable(path)
         with np.load(path, allow_pickle=False) as file:
@@ -454,7 +431,7 @@ def _require_unpackable(path: Path) -> None:
     locked = [member.filename for member in members if member.flag_bits & 1]
     if locked:
         raise ForeignFileError(
-            path, "is encrypted", at=locked[0], expected="a zip without a password is expected"
+            path, "is encrypted; a zip without a password is expected", at=locked[0]
         )
     _require_size(path, sum(member.file_size for member in members))
 
@@ -462,7 +439,7 @@ def _require_unpackable(path: Path) -> None:
 def require_file(path: Path) -> None:
     """Refuses what is no file, an empty one, and one that is too large."""
     if path.is_dir():
-        raise ForeignFileError(path, "is a folder", expected="one file of it is expected")
+        raise ForeignFileError(path, "is a folder; one file of it is expected")
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
     size = path.stat().st_size
@@ -475,8 +452,8 @@ def _require_size(path: Path, size: int) -> None:
     if size > ARRAYS_BYTES_MAX:
         raise ForeignFileError(
             path,
-            f"holds {size} bytes of arrays",
-            expected=f"at most {ARRAYS_BYTES_MAX} are expected: cut the drive into pieces",
+            f"holds {size} bytes of arrays; at most {ARRAYS_BYTES_MAX} are expected: cut the drive "
+            "into pieces",
         )
 
 

@@ -87,7 +87,7 @@ def _position(motion: Motion, arm_m: Floats) -> Floats:
     return p + arm
 
 
-SMALL_SENSORS = (
+SMALL_SENSORS = WHEEL, STANDSTILL, POSITION = (
     SmallSensor(
         "wheel",
         {"x": "vx_mps", "y": "vy_mps", "z": "vz_mps"},

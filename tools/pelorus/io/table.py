@@ -160,8 +160,16 @@ class Table:
                 hint = self.hint_of(lacking[0], self.names)
             raise ForeignFileError(
                 self.path,
-                f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}",
-                expected=f"there are: {there}{hint}",
+                f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}; "
+                f"there are: {there}{hint}",
+            )
+
+    def refuse(self, wrong: NDArray[np.bool_], what: str | Callable[[int], str]) -> None:
+        """Raises ForeignFileError with what is wrong in the first of these rows, if any."""
+        if wrong.any():
+            k = int(wrong.argmax())
+            raise ForeignFileError(
+                self.path, what if isinstance(what, str) else what(k), at=self.row(k)
             )
 
     def numbers(self, *names: str) -> Floats:
@@ -255,13 +263,10 @@ class Table:
 
     def ascending_times(self) -> NDArray[np.int64]:
         t_ns = self.times()
-        back = np.nonzero(np.diff(t_ns) <= 0)[0]
-        if len(back):
-            raise ForeignFileError(
-                self.path,
-                f"time does not ascend ({t_ns[back[0]]} ns, then {t_ns[back[0] + 1]} ns)",
-                at=self.row(int(back[0]) + 1),
-            )
+        self.refuse(
+            np.concatenate(([False], np.diff(t_ns) <= 0)),
+            lambda k: f"time does not ascend ({t_ns[k - 1]} ns, then {t_ns[k]} ns)",
+        )
         return t_ns
 
     def _called(self, name: str) -> str:
@@ -275,17 +280,12 @@ class Table:
                 raise ValueError
             column = np.array(cells, dtype=np.float64)
         except ValueError:
-            row = next(k for k, cell in enumerate(cells) if not foreign.is_number(cell))
-            raise ForeignFileError(
-                self.path,
-                f"{self._called(name)} is {_shown(cells[row])}, a number is expected",
-                at=self.row(row),
-            ) from None
-        if not np.isfinite(column).all():
-            row = int(np.nonzero(~np.isfinite(column))[0][0])
-            raise ForeignFileError(
-                self.path, f"{self._called(name)} is not finite", at=self.row(row)
+            self.refuse(
+                np.array([not foreign.is_number(cell) for cell in cells]),
+                lambda k: f"{self._called(name)} is {_shown(cells[k])}, a number is expected",
             )
+            raise
+        self.refuse(~np.isfinite(column), f"{self._called(name)} is not finite")
         factor = self._factor.get(name, 1.0)
         return column if factor == 1.0 else column * factor
 

@@ -148,6 +148,11 @@ class Tracks:
         first = np.nonzero(found)[0]
         return Pairs(self.frame[first], first, at[first])
 
+    def twice(self) -> int | None:
+        """Returns a row whose id stands in its frame a second time; None if there is none."""
+        again = (np.diff(self.frame) == 0) & (np.diff(self.id) == 0)
+        return int(again.argmax()) if again.any() else None
+
     def check(self, source: Path) -> None:
         """Refuses what no recording can hold."""
         if not len(self):
@@ -163,6 +168,6 @@ class Tracks:
         if fullest > OBSERVATIONS_MAX:
             raise ForeignFileError(
                 source,
-                f"a frame has {fullest} observations",
-                expected=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
+                f"a frame has {fullest} observations; at most {OBSERVATIONS_MAX} fit a STEREO "
+                "frame",
             )

@@ -80,9 +80,8 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
     if columns < POSE_COLUMNS:
         raise ForeignFileError(
             path,
-            f"has {columns} numbers",
+            f"has {columns} numbers; {POSE_COLUMNS} are expected: t x y z qx qy qz qw",
             at=f"line {sound.rows[0].line}",
-            expected=f"{POSE_COLUMNS} are expected: t x y z qx qy qz qw",
         )
     if in_ns is None:
         in_ns = arrays.are_ns(sound.numbers[:, 0])
@@ -98,12 +97,11 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
     q = sound.numbers[:, q_at : q_at + 4]
     q = np.roll(q, -1, axis=1) if order == "wxyz" else q
     once, repeats = ascending(path, sound.rows, t_ns)
-    turned, turnless = _turned(path, sound.rows, q)
-    good = once & turned
-    poses = Poses(
-        scipy.spatial.transform.Rotation.from_quat(q[good]).as_matrix(),
-        sound.numbers[good, p_at : p_at + 3],
-    )
+    wrong = off_unit(q)
+    what = "the quaternion's norm is not 1"
+    turnless = foreign.left_out(path, wrong, lambda k: f"line {sound.rows[k].line}", what)
+    good = once & ~wrong
+    poses = Poses.of_quaternions(q[good], sound.numbers[good, p_at : p_at + 3])
     return Trajectory(t_ns[good], poses, (*remarks, *repeats, *turnless))
 
 
@@ -129,10 +127,9 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
     if order not in ("xyzw", "wxyz") or max(at.values()) != begin + 3 or begin not in (1, 4):
         raise ForeignFileError(
             path,
-            f"names the columns {', '.join(names[:POSE_COLUMNS])}",
-            expected="time, position and quaternion (x y z w, or w first) are expected, in that "
-            "order or "
-            "the quaternion before the position",
+            f"names the columns {', '.join(names[:POSE_COLUMNS])}; time, position and quaternion "
+            "(x y z w, or w first) are expected, in that order or the quaternion before the "
+            "position",
         )
     return (1, 4, order) if begin == 4 else (5, 1, order)
 
@@ -158,11 +155,9 @@ def ascending(
     return ~(unset | again), remarks
 
 
-def _turned(path: Path, rows: list[Row], q: Floats) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Returns which quaternions are rotations, and remarks on the other rows."""
-    wrong = np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1) > QUATERNION_NORM_TOLERANCE, np.bool_)
-    what = "the quaternion's norm is not 1"
-    return ~wrong, foreign.left_out(path, wrong, lambda k: f"line {rows[k].line}", what)
+def off_unit(q: Floats) -> NDArray[np.bool_]:
+    """Returns which quaternions (n, 4) are no rotations."""
+    return np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1) > QUATERNION_NORM_TOLERANCE, np.bool_)
 
 
 def read_truth(path: Path, times: Path | None = None, recording: Path | None = None) -> Trajectory:
@@ -181,8 +176,8 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
     if columns < POSE_COLUMNS:
         raise ForeignFileError(
             path,
-            f"rows of {columns} numbers",
-            expected=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are expected",
+            f"rows of {columns} numbers; {POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} "
+            "(KITTI) are expected",
         )
     return read_stamped(path)
 
@@ -247,9 +242,8 @@ def read_kitti(path: Path) -> Poses:
     if len(rows[0].cells) != KITTI_COLUMNS:
         raise ForeignFileError(
             path,
-            f"has {len(rows[0].cells)} cells",
+            f"has {len(rows[0].cells)} cells; {KITTI_COLUMNS} numbers are expected ([R | p])",
             at=f"line {rows[0].line}",
-            expected=f"{KITTI_COLUMNS} numbers are expected ([R | p])",
         )
     numbers = foreign.numbers(path, rows, KITTI_COLUMNS)
     matrices = numbers.reshape(-1, 3, 4)
@@ -257,9 +251,7 @@ def read_kitti(path: Path) -> Poses:
     off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
     if off.max() > 1e-2:
         at = f"line {rows[int(off.argmax())].line}"
-        raise ForeignFileError(
-            path, "holds no rotation", at=at, expected="[R | p] is expected, row by row"
-        )
+        raise ForeignFileError(path, "holds no rotation; [R | p] is expected, row by row", at=at)
     return Poses(se3.nearest_rotation(R), matrices[:, :, 3])
 
 
@@ -281,9 +273,7 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
         t_ns = times_of(times, foreign.rows(times))
         whose = times
     else:
-        raise ForeignFileError(
-            path, "KITTI poses carry no times", expected="give --recording or --times"
-        )
+        raise ForeignFileError(path, "KITTI poses carry no times; give --recording or --times")
     if len(poses.p) > len(t_ns):
         raise ForeignFileError(path, f"{len(poses.p)} poses, but {whose} has {len(t_ns)} times")
     return Trajectory(t_ns[: len(poses.p)], poses)

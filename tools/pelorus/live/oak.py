@@ -20,7 +20,7 @@ from pelorus.io.named import Named
 from pelorus.live import factory
 from pelorus.live.camera import Asked, Force, Measured, Picture, Rate
 from pelorus.program.extras import extra
-from pelorus.rig import depthai as eeprom
+from pelorus.rig.factory import depthai
 from pelorus.rig.rig import Rig
 
 SIZE, RATE_HZ, IMU_HZ = (640, 400), 20, 200
@@ -34,7 +34,7 @@ ABSENT = (
 
 def rig_of(content: dict[str, Any]) -> Rig:
     """Returns what the EEPROM's JSON says of the mono pair and the IMU."""
-    return eeprom.read(Named(Path("the OAK's EEPROM"), content), PAIR)
+    return depthai(Named(Path("the OAK's EEPROM"), content), PAIR)
 
 
 def nanoseconds(stamp: timedelta) -> int:

@@ -24,6 +24,11 @@ class Poses(NamedTuple):
     R: Floats
     p: Floats
 
+    @classmethod
+    def of_quaternions(cls, q: ArrayLike, p: Floats) -> Poses:
+        """Returns the poses of quaternions (..., 4), x y z w."""
+        return cls(np.asarray(scipy.spatial.transform.Rotation.from_quat(q).as_matrix()), p)
+
     def at(self, index: int | slice | NDArray[np.intp] | NDArray[np.bool_]) -> Poses:
         return Poses(self.R[index], self.p[index])
 

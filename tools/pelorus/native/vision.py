@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ctypes as c
 from functools import cache
-from typing import Any, NamedTuple, Protocol, cast
+from typing import Any, NamedTuple
 
 from pelorus.errors import PelorusError
 from pelorus.native import binding
@@ -147,21 +147,8 @@ SIGNATURES: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
 )
 
 
-class VisionLibrary(Protocol):
-    """The functions of the table above, as attributes of the library."""
-
-    def size_of(self, name: str) -> int: ...
-    def text(self, status: int) -> str: ...
-    def binding_vision_init(self, vision: Any, rig: Any) -> int: ...
-    def vision_calibration(self, vision: Any, T_LB: Any, calibration: Any) -> int: ...
-    def vision_forget(self, vision: Any) -> int: ...
-    def vision_track(self, vision: Any, pair: Any, expected: Any, frame: Any) -> int: ...
-    def binding_vision_report(self, vision: Any, sights: Any, ended: Any) -> Any: ...
-    def binding_vision_limits(self, tracks: Any) -> int: ...
-
-
 @cache
-def library(precision: Precision = "float32") -> VisionLibrary:
+def library(precision: Precision = "float32") -> binding.Library:
     """Returns the library with these functions; raises PelorusError if it has none."""
     found = binding.library(precision)
     differ = [s.c_name for s in STRUCTS if found.size_of(s.c_name) != c.sizeof(s)]
@@ -175,7 +162,7 @@ def library(precision: Precision = "float32") -> VisionLibrary:
         raise PelorusError(
             f"the library has another {', '.join(differ)}: build it anew, or install both together"
         )
-    return cast(VisionLibrary, found)
+    return found
 
 
 class Limits(NamedTuple):

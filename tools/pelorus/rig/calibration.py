@@ -67,9 +67,9 @@ class _Calibration(Named):
         if len(given) != 1:
             raise ForeignFileError(
                 self.path,
-                f"has {' and '.join(f'R_{pair}' for pair in given) or 'neither R_CB nor R_BC'}",
-                expected="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
-                "(the camera's pose in the body) are expected",
+                f"has {' and '.join(f'R_{pair}' for pair in given) or 'neither R_CB nor R_BC'}; "
+                "either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m (the camera's "
+                "pose in the body) are expected",
             )
         pair = given[0]
         R = arrays.rotation(self.path, f"R_{pair}", self.array(f"R_{pair}", 3, 3))
@@ -105,6 +105,6 @@ class _Calibration(Named):
         if unknown:
             raise ForeignFileError(
                 self.path,
-                f"{where} has the unknown name {', '.join(unknown)}",
-                expected=f"known are: {', '.join(sorted(known))}",
+                f"{where} has the unknown name {', '.join(unknown)}; known are: "
+                f"{', '.join(sorted(known))}",
             )

@@ -17,8 +17,7 @@ from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
-from pelorus.rig.kalibr import matrix
-from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
+from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel, intrinsics_in
 from pelorus.rig.rig import Rig
 from pelorus.wire.layout import Floats
 
@@ -50,23 +49,22 @@ class Info(NamedTuple):
         if P[0, 0] <= 0 or K[0, 0] <= 0:
             raise ForeignFileError(
                 self.path,
-                "the camera is not calibrated: K or P is 0",
+                "the camera is not calibrated: K or P is 0; --calibration is expected",
                 at=self.at,
-                expected="--calibration is expected",
             )
         size = self.width_px, self.height_px
         if rectified:
-            return Lens(LensModel.NONE, (P[0, 0], P[1, 1], P[0, 2], P[1, 2]), (), *size)
+            return Lens(LensModel.NONE, intrinsics_in(P), (), *size)
         model = LENSES.get(self.model, LensModel.NONE) if D.any() else LensModel.NONE
         if D.any() and (self.model not in LENSES or len(D) not in COEFFICIENTS[model]):
             raise ForeignFileError(
                 self.path,
-                f"distortion model {self.model!r} with {len(D)} numbers",
+                f"distortion model {self.model!r} with {len(D)} numbers; "
+                f"{' or '.join(filter(None, LENSES))} is expected",
                 at=self.at,
-                expected=f"{' or '.join(filter(None, LENSES))} is expected",
             )
         coefficients = tuple(D.tolist()) if D.any() else ()
-        return Lens(model, (K[0, 0], K[1, 1], K[0, 2], K[1, 2]), coefficients, *size)
+        return Lens(model, intrinsics_in(K), coefficients, *size)
 
 
 @dataclass(frozen=True)
@@ -110,19 +108,16 @@ def is_camera_info(content: Named) -> bool:
 
 def read(content: Named) -> Info:
     """Reads one file."""
-    D = _row(content, "distortion_coefficients")
-    model = content.content.get("distortion_model", "plumb_bob")
-    width, height = (content.content.get(name, 0) for name in ("image_width", "image_height"))
     return Info(
         content.path,
         content.at,
-        matrix(content, "camera_matrix", 3, 3),
-        D,
-        matrix(content, "rectification_matrix", 3, 3),
-        matrix(content, "projection_matrix", 3, 4),
-        str(model),
-        int(width),
-        int(height),
+        content.matrix("camera_matrix", 3, 3),
+        content.row("distortion_coefficients"),
+        content.matrix("rectification_matrix", 3, 3),
+        content.matrix("projection_matrix", 3, 4),
+        str(content.content.get("distortion_model", "plumb_bob")),
+        int(content.content.get("image_width", 0)),
+        int(content.content.get("image_height", 0)),
     )
 
 
@@ -132,14 +127,7 @@ def pair(first: Named, second: Named, lens: LensModel | None) -> Rig:
     if not infos.have_baseline:
         raise ForeignFileError(
             second.path,
-            "the projection_matrix of neither camera has a baseline",
-            expected="files of a stereo calibration are expected: P[3] of the right one is -fx "
-            "baseline",
+            "the projection_matrix of neither camera has a baseline; files of a stereo calibration "
+            "are expected: P[3] of the right one is -fx baseline",
         )
     return infos.rig()
-
-
-def _row(content: Named, name: str) -> Floats:
-    inner = content.object(name)
-    count = int(inner.number("rows") * inner.number("cols"))
-    return inner.array("data", count)

@@ -8,13 +8,23 @@ of the measured a_m, w_m: scales, axes that are not square, a gyro that feels fo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from pelorus.io.named import Named
 from pelorus.math.inertial import Inertial
 from pelorus.wire.frames import Noise
 from pelorus.wire.layout import Floats
+
+NOISES = ("gyro_noise", "accel_noise", "gyro_walk", "accel_walk")
+
+
+def noise(content: Named, keys: Sequence[str]) -> Noise:
+    """Returns the densities that the file has under these keys, in the order of NOISES."""
+    there = [(name, key) for name, key in zip(NOISES, keys, strict=True) if key in content]
+    return Noise(**{name: content.number(key) for name, key in there})
 
 
 @dataclass(frozen=True)

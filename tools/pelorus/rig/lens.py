@@ -4,8 +4,13 @@
 none         no distortion
 radtan       radial and tangential: k1 k2 p1 p2, and of OpenCV k3 and more
 equidistant  fisheye (Kannala and Brandt 2006): k1 k2 k3 k4
-omni         by way of a sphere (spheres): xi, and k1 k2 p1 p2 of the distortion behind it
-eucm, ds     likewise: alpha beta; xi alpha
+
+These project wide angles by way of a sphere, before K:
+
+omni   unified (Mei and Rives 2007): onto a sphere, seen from a point xi above its middle, and
+       k1 k2 p1 p2 of the distortion behind it
+eucm   enhanced unified (Khomutenko et al. 2016): alpha, beta
+ds     double sphere (Usenko et al. 2018): xi, alpha
 """
 
 from __future__ import annotations
@@ -16,8 +21,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.io.named import Named
 from pelorus.program.extras import cv2
-from pelorus.rig import spheres
 from pelorus.wire.layout import Floats
 
 
@@ -41,9 +46,34 @@ COEFFICIENTS = {
     LensModel.EUCM: (2,),
     LensModel.DS: (2,),
 }
+SPHERES = {"omni": 1, "eucm": 2, "ds": 2}  # parameters before those of the distortion
 NEWTON_STEPS = 10
 DIFFERENCE = 1e-6  # of a ray, for derivatives
 MISS_MAX_PX = 0.01  # a ray's pixel may be off by so much
+Intrinsics = tuple[float, float, float, float]  # fx, fy, cx, cy
+
+
+def intrinsics(content: Named, *names: str) -> Intrinsics:
+    """Reads fx, fy, cx, cy under these names."""
+    fx, fy, cx, cy = (content.number(name) for name in names)
+    return fx, fy, cx, cy
+
+
+def intrinsics_in(K: Floats) -> Intrinsics:
+    """Returns fx, fy, cx, cy of a camera matrix, or of a projection."""
+    return float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2])
+
+
+def coefficients(content: Named, name: str, model: LensModel) -> tuple[float, ...]:
+    """Reads a list with as many coefficients as the model may have."""
+    if model is LensModel.NONE:
+        return ()
+    value = content.get(name)
+    count = len(value) if isinstance(value, list) else 0
+    if count not in COEFFICIENTS[model]:
+        expected = " or ".join(map(str, COEFFICIENTS[model]))
+        raise content.error(name, value, f"{expected} numbers are expected for {model}")
+    return tuple(content.array(name, count).tolist())
 
 
 @dataclass(frozen=True)
@@ -51,7 +81,7 @@ class Lens:
     """fx, fy, cx, cy in px, with the distortion; a width of 0 is unknown."""
 
     model: LensModel
-    intrinsics: tuple[float, float, float, float]
+    intrinsics: Intrinsics
     coefficients: tuple[float, ...] = ()
     width_px: int = 0
     height_px: int = 0
@@ -85,7 +115,7 @@ class Lens:
         if not len(rays):
             return np.empty((0, 2))
         if self._sphere:
-            rays = spheres.onto_plane(self.model, self._sphere, rays)
+            rays = _onto_plane(self.model, self._sphere, rays)
         points = np.column_stack((rays, np.ones(len(rays))))[:, None]
         project = cv2.fisheye.projectPoints if self._is_fisheye else cv2.projectPoints
         zero = np.zeros(3)
@@ -93,7 +123,7 @@ class Lens:
         return np.asarray(pixels, np.float64).reshape(-1, 2)
 
     def maps(
-        self, R: Floats, four: tuple[float, float, float, float], size: tuple[int, int]
+        self, R: Floats, four: Intrinsics, size: tuple[int, int]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Returns for each pixel of a camera without distortion, turned by R, the column and the
         row in this one's picture. `four`: its fx, fy, cx, cy; `size`: width, height, px."""
@@ -123,7 +153,7 @@ class Lens:
             find(np.ascontiguousarray(pixels[:, None], np.float64), self.K, self._D), np.float64
         ).reshape(-1, 2)
         if self._sphere:
-            rays = spheres.from_plane(self.model, self._sphere, rays)
+            rays = _from_plane(self.model, self._sphere, rays)
         with np.errstate(all="ignore"):
             for _ in range(NEWTON_STEPS):
                 J = self._slope(rays)
@@ -147,8 +177,49 @@ class Lens:
 
     @property
     def _sphere(self) -> tuple[float, ...]:
-        return self.coefficients[: spheres.PARAMETERS.get(self.model, 0)]
+        return self.coefficients[: SPHERES.get(self.model, 0)]
 
     @property
     def _D(self) -> Floats:
         return np.array(self.coefficients[len(self._sphere) :] or (0.0,) * 4)
+
+
+# --- by way of a sphere ---------------------------------------------------------------------------
+
+
+def _onto_plane(model: str, parameters: tuple[float, ...], rays: Floats) -> Floats:
+    """Maps rays (n, 2) ahead of the camera, x/z and y/z, to the plane m of a pinhole."""
+    r2 = np.sum(rays**2, axis=1)
+    if model == "eucm":
+        alpha, beta = parameters
+        return np.asarray(rays / (alpha * np.sqrt(beta * r2 + 1) + 1 - alpha)[:, None])
+    length = np.sqrt(r2 + 1)
+    if model == "omni":
+        return np.asarray(rays / (1 + parameters[0] * length)[:, None])
+    xi, alpha = parameters
+    z = xi * length + 1
+    return np.asarray(rays / (alpha * np.sqrt(r2 + z**2) + (1 - alpha) * z)[:, None])
+
+
+def _from_plane(model: str, parameters: tuple[float, ...], m: Floats) -> Floats:
+    """Maps m to rays; NaN where none is ahead."""
+    r2 = np.sum(m**2, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        if model == "omni":
+            z = 1 - parameters[0] * (1 + r2) / (
+                parameters[0] + np.sqrt(1 + (1 - parameters[0] ** 2) * r2)
+            )
+        elif model == "eucm":
+            alpha, beta = parameters
+            z = _lifted(alpha, beta, r2)
+        else:
+            xi, alpha = parameters
+            up = _lifted(alpha, 1.0, r2)
+            k = (up * xi + np.sqrt(up**2 + (1 - xi**2) * r2)) / (up**2 + r2)
+            z = up - xi / k
+        return np.where((z > 0)[:, None], m / z[:, None], np.nan)
+
+
+def _lifted(alpha: float, beta: float, r2: Floats) -> Floats:
+    root = np.sqrt(1 - (2 * alpha - 1) * beta * r2)
+    return np.asarray((1 - beta * alpha**2 * r2) / (alpha * root + 1 - alpha))

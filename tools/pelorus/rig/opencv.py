@@ -10,16 +10,12 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pelorus.io import arrays
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
-from pelorus.math import se3
 from pelorus.math.se3 import Poses
-from pelorus.rig.kalibr import matrix
-from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
+from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel, intrinsics_in
 from pelorus.rig.rig import Rig
+from pelorus.wire.layout import Floats
 
 # Names of the matrix of camera {} and of its lens; and what {} may be for the two.
 MATRICES = ("K{}", "M{}", "CM{}", "cameraMatrix{}", "CameraMatrix{}", "camera_matrix{}")
@@ -39,67 +35,48 @@ def is_opencv(content: Named) -> bool:
 
 def stereo(content: Named, model: LensModel | None) -> Rig:
     """Reads the pair; `model` is needed where the number of coefficients leaves it open."""
-    T_21 = Poses(
-        se3.nearest_rotation(arrays.rotation(content.path, "R", matrix(content, "R", 3, 3))),
-        _column(content, next((name for name in SHIFTS if name in content), SHIFTS[0])),
-    )
+    T_21 = Poses(content.rotation("R"), _shift(content, content.first_of(SHIFTS) or SHIFTS[0]))
     return Rig.of_cameras(content.path, _lens(content, 1, model), _lens(content, 2, model), T_21)
 
 
-def _column(content: Named, name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    value = content.get(name)
-    if isinstance(value, dict) and value.get("rows") == 1:
-        return matrix(content, name, 1, 3).ravel()
-    if isinstance(value, dict):
-        return matrix(content, name, 3, 1).ravel()
-    return content.array(name, 3)
+def _shift(content: Named, name: str) -> Floats:
+    is_object = isinstance(content.get(name), dict)
+    return content.matrix(name, 3, 1).ravel() if is_object else content.array(name, 3)
 
 
 def _lens(content: Named, number: int, model: LensModel | None) -> Lens:
-    K = matrix(content, _one_of(content, MATRICES, number), 3, 3)
-    fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    K = content.matrix(_one_of(content, MATRICES, number), 3, 3)
+    four = intrinsics_in(K)
+    fx, fy, *_ = four
     if min(fx, fy) <= 0 or abs(K[0, 1]) > 1e-6 * fx:
         raise ForeignFileError(
             content.path,
-            f"camera {number} has fx {fx:g}, fy {fy:g}, skew {K[0, 1]:g}",
-            expected="positive focal lengths and no skew are expected",
+            f"camera {number} has fx {fx:g}, fy {fy:g}, skew {K[0, 1]:g}; positive focal lengths "
+            "and no skew are expected",
         )
     name = _one_of(content, DISTORTIONS, number)
-    D = _numbers(content, name)
-    size = next((name for name in SIZES if name in content), None)
+    D = tuple(content.row(name).tolist())
+    size = content.first_of(SIZES)
     width, height = content.size(size) if size else (0, 0)
-    intrinsics = (float(fx), float(fy), float(cx), float(cy))
     if not any(D):
-        return Lens(LensModel.NONE, intrinsics, (), width, height)
-    return Lens(_model(content, name, len(D), model), intrinsics, D, width, height)
+        return Lens(LensModel.NONE, four, (), width, height)
+    return Lens(_model(content, name, len(D), model), four, D, width, height)
 
 
 def _model(content: Named, name: str, count: int, asked: LensModel | None) -> LensModel:
     if asked is None and count == FISHEYE_OR_NOT:
         raise ForeignFileError(
             content.path,
-            f"{name} has 4 numbers, as radtan and a fisheye have",
-            expected="--lens radtan or --lens equidistant is expected",
+            f"{name} has 4 numbers, as radtan and a fisheye have; --lens radtan or --lens "
+            "equidistant is expected",
         )
     model = asked if asked in LENSES and asked is not None else LensModel.RADTAN
     if count not in COEFFICIENTS[model]:
         expected = " or ".join(map(str, COEFFICIENTS[model]))
         raise ForeignFileError(
-            content.path,
-            f"{name} has {count} numbers",
-            expected=f"{expected} are expected for {model}",
+            content.path, f"{name} has {count} numbers; {expected} are expected for {model}"
         )
     return model
-
-
-def _numbers(content: Named, name: str) -> tuple[float, ...]:
-    value = content.get(name)
-    if not isinstance(value, dict):
-        value = np.ravel(value).tolist()
-        return tuple(Named(content.path, {name: value}).array(name, len(value)).tolist())
-    inner = content.object(name)
-    count = int(inner.number("rows") * inner.number("cols"))
-    return tuple(inner.array("data", count).tolist())
 
 
 def _one_of(content: Named, patterns: tuple[str, ...], number: int) -> str:
@@ -108,8 +85,8 @@ def _one_of(content: Named, patterns: tuple[str, ...], number: int) -> str:
             return name
     raise ForeignFileError(
         content.path,
-        f"lacks {' or '.join(pattern.format(number) for pattern in patterns)}",
-        expected=f"there are: {', '.join(content.content) or 'none'}",
+        f"lacks {' or '.join(pattern.format(number) for pattern in patterns)}; there are: "
+        f"{', '.join(content.content) or 'none'}",
     )
 
 
@@ -123,7 +100,7 @@ def xml_words(path: Path, words: str) -> dict[str, Any]:
     except ET.ParseError as error:
         raise ForeignFileError(path, f"is no XML: {error}") from None
     if root.tag != "opencv_storage":
-        raise ForeignFileError(path, f"is XML of {root.tag}", expected="opencv_storage is expected")
+        raise ForeignFileError(path, f"is XML of {root.tag}; opencv_storage is expected")
     return {one.tag: _value(one) for one in root}
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Reads calibrations of every kind, which their contents tell apart.
 
-JSON of a rectified pair is the project's own (`calibration`); KINDS lists those of others.
+JSON of a rectified pair is the project's own (`calibration`); FORMATS lists those of others.
 Kalibr's file of an IMU may accompany any of them.
 """
 
@@ -17,17 +17,13 @@ from pelorus.io import foreign
 from pelorus.io.foreign import ForeignFileError
 from pelorus.io.named import Named
 from pelorus.rig import (
-    basalt,
     calibration,
     camera_info,
-    depthai,
+    camera_lists,
+    factory,
     kalibr,
-    okvis,
     opencv,
-    orb_slam,
-    svo,
-    vins,
-    zed,
+    slam_settings,
 )
 from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.lens import LensModel
@@ -52,6 +48,12 @@ class Calibrated:
     chosen: tuple[str, ...] = ()  # remarks on the choice of cameras
 
     @property
+    def sizes(self) -> list[tuple[int, int]]:
+        """Returns widths and heights of the pictures for which it was made; 0 where unknown."""
+        own = [(self.header.image_width_px, self.header.image_height_px)]
+        return own if self.rig is None else self.rig.sizes
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         return (*self.chosen, *self.imu.remarks)
 
@@ -61,7 +63,7 @@ def is_own(paths: Sequence[Path]) -> bool:
     if len(paths) != 1 or paths[0].suffix.lower() != ".json":
         return False
     content = _content(paths[0])
-    return not any(kind.is_one(content) for kind in KINDS)
+    return "fx_px" in content or _format_of(content) is None
 
 
 def read(
@@ -94,12 +96,10 @@ def without_cameras(paths: Sequence[Path], name: str) -> Calibrated:
     if is_own(paths):
         return read(paths, name)
     contents = _contents(paths)
-    if any(kind.is_one(content) for content in contents for kind in KINDS):
+    if any(map(_format_of, contents)):
         return read(paths, name)
-    if any(not kalibr.is_imu(content) for content in contents) or len(contents) > 1:
-        raise ForeignFileError(
-            paths[-1], "is no IMU's file, or a second one", expected="one is expected"
-        )
+    if not all(map(kalibr.is_imu, contents)) or len(contents) > 1:
+        raise ForeignFileError(paths[-1], "is no IMU's file, or a second one; one is expected")
     imu = kalibr.imu(contents[0]) if contents else ImuModel()
     return Calibrated(Header(NO_CAMERA, name=header_name(name)), imu=imu)
 
@@ -117,41 +117,29 @@ def read_rig(
     paths: Sequence[Path], lens: LensModel | None = None, cameras: Sequence[str] = ()
 ) -> Rig:
     """Returns the rig that one file or several describe together."""
-    contents = _contents(paths)
-    kinds = [next((kind for kind in KINDS if kind.is_one(one)), None) for one in contents]
-    for content, kind in zip(contents, kinds, strict=True):
-        if kind is None and not kalibr.is_imu(content):
+    contents = [(content, _format_of(content)) for content in _contents(paths)]
+    files = [content for content, known in contents if known]
+    imus = [content for content, known in contents if not known]
+    for content in imus:
+        if not kalibr.is_imu(content):
             raise ForeignFileError(
                 content.path,
-                "is no calibration that is known",
-                expected=f"{', '.join(kind.name for kind in KINDS)} or the project's JSON is "
-                "expected; there "
-                f"are: {', '.join(content.content) or 'no names'}",
+                f"is no calibration that is known; {', '.join(one.name for one in FORMATS)} or the "
+                "project's JSON is expected; there are: "
+                f"{', '.join(content.content) or 'no names'}",
             )
-    found = [kind for kind in kinds if kind is not None]
+    found = list(dict.fromkeys(known for _, known in contents if known))
     if not found:
-        raise ForeignFileError(
-            paths[0], "is of an IMU alone", expected="one of the cameras is expected too"
-        )
-    if any(kind is not found[0] for kind in found):
-        names = " and ".join(dict.fromkeys(kind.name for kind in found))
-        raise ForeignFileError(
-            paths[0], f"and the others are {names}", expected="files of one are expected"
-        )
-    files = [content for content, kind in zip(contents, kinds, strict=True) if kind is not None]
+        raise ForeignFileError(paths[0], "is of an IMU alone; one of the cameras is expected too")
+    if len(found) > 1:
+        names = " and ".join(one.name for one in found)
+        raise ForeignFileError(paths[0], f"and the others are {names}; files of one are expected")
     if len(files) not in found[0].files:
-        expected = " or ".join(map(str, found[0].files))
-        raise ForeignFileError(
-            files[-1].path,
-            f"{len(files)} files of cameras",
-            expected=f"{expected} of {found[0].name} are expected",
-        )
+        expected = f"{' or '.join(map(str, found[0].files))} of {found[0].name} are expected"
+        raise ForeignFileError(files[-1].path, f"{len(files)} files of cameras; {expected}")
     rig = found[0].read(files, lens, cameras)
-    imus = [content for content, kind in zip(contents, kinds, strict=True) if kind is None]
     if len(imus) > 1:
-        raise ForeignFileError(
-            imus[1].path, "is the second file of an IMU", expected="one is expected"
-        )
+        raise ForeignFileError(imus[1].path, "is the second file of an IMU; one is expected")
     return kalibr.with_imu(rig, imus[0]) if imus else rig
 
 
@@ -164,15 +152,14 @@ def are_of_imu(paths: Sequence[Path]) -> bool:
     """Returns whether these files are of an IMU alone, without cameras."""
     contents = _contents(paths)
     return bool(contents) and all(
-        kalibr.is_imu(content) and not any(kind.is_one(content) for kind in KINDS)
-        for content in contents
+        kalibr.is_imu(content) and _format_of(content) is None for content in contents
     )
 
 
 def with_imu(rig: Rig, paths: Sequence[Path]) -> Rig:
     """Returns the rig on the IMU that one of these files describes."""
     if len(paths) > 1:
-        raise ForeignFileError(paths[1], "is the second file of an IMU", expected="one is expected")
+        raise ForeignFileError(paths[1], "is the second file of an IMU; one is expected")
     return kalibr.with_imu(rig, _content(paths[0]))
 
 
@@ -195,17 +182,17 @@ def _content(path: Path) -> Named:
         return Named(path, opencv.xml_words(path, words))
     lines = (line for line in words.splitlines() if line.strip() and line[0] not in "#;")
     if SECTION.match(next(lines, "")):
-        return zed.sections(path, words)
+        return factory.sections(path, words)
     return Named(path, foreign.yaml_words(path, words))
 
 
-class CalibrationKind(NamedTuple):
-    """A program's calibration, with its number of files."""
+class Format(NamedTuple):
+    """A program's calibration, with its possible numbers of files."""
 
     name: str
     is_one: Callable[[Named], bool]
-    files: tuple[int, ...]
     read: Callable[[list[Named], LensModel | None, Sequence[str]], Rig]
+    files: tuple[int, ...] = (1,)
 
 
 def _opencv(contents: list[Named], lens: LensModel | None, _: Sequence[str]) -> Rig:
@@ -214,41 +201,40 @@ def _opencv(contents: list[Named], lens: LensModel | None, _: Sequence[str]) -> 
 
 
 # Tested in this order: names that several programs use come last.
-KINDS = (
-    CalibrationKind(
-        "Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _, of: kalibr.camchain(c[0], of)
-    ),
-    CalibrationKind(
-        "sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, *_: kalibr.pair(*c)
-    ),
-    CalibrationKind(
+FORMATS = (
+    Format("Kalibr's camchain", kalibr.is_camchain, lambda c, _, of: kalibr.camchain(c[0], of)),
+    Format("sensor.yaml of a camera", kalibr.is_sensor, lambda c, *_: kalibr.pair(*c), (2,)),
+    Format(
         "camera_info of ROS",
         camera_info.is_camera_info,
-        (2,),
         lambda c, lens, _: camera_info.pair(c[0], c[1], lens),
+        (2,),
     ),
-    CalibrationKind(
-        "ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, *_: orb_slam.read(c[0])
-    ),
-    CalibrationKind(
+    Format("ORB-SLAM's settings", slam_settings.is_orb, lambda c, *_: slam_settings.orb(c[0])),
+    Format(
         "VINS-Fusion's configuration",
-        lambda content: vins.is_config(content) or vins.is_camera(content),
+        slam_settings.is_vins,
+        lambda c, *_: slam_settings.vins(c),
         (1, 2, 3),
-        lambda c, *_: vins.read(c),
     ),
-    CalibrationKind(
-        "Basalt's calibration", basalt.is_calibration, (1,), lambda c, _, of: basalt.read(c[0], of)
+    Format(
+        "Basalt's calibration",
+        camera_lists.is_basalt,
+        lambda c, _, of: camera_lists.basalt(c[0], of),
     ),
-    CalibrationKind(
-        "OKVIS's configuration", okvis.is_config, (1,), lambda c, _, of: okvis.read(c[0], of)
+    Format(
+        "OKVIS's configuration",
+        camera_lists.is_okvis,
+        lambda c, _, of: camera_lists.okvis(c[0], of),
     ),
-    CalibrationKind("SVO's or maplab's rig", svo.is_rig, (1,), lambda c, _, of: svo.read(c[0], of)),
-    CalibrationKind(
-        "DepthAI's calibration",
-        depthai.is_calibration,
-        (1,),
-        lambda c, _, of: depthai.read(c[0], of),
+    Format(
+        "SVO's or maplab's rig", camera_lists.is_svo, lambda c, _, of: camera_lists.svo(c[0], of)
     ),
-    CalibrationKind("a ZED's .conf", zed.is_conf, (1,), lambda c, *_: zed.read(c[0])),
-    CalibrationKind("OpenCV's stereo calibration", opencv.is_opencv, (1, 2), _opencv),
+    Format("DepthAI's calibration", factory.is_depthai, lambda c, _, of: factory.depthai(c[0], of)),
+    Format("a ZED's .conf", factory.is_zed, lambda c, *_: factory.zed(c[0])),
+    Format("OpenCV's stereo calibration", opencv.is_opencv, _opencv, (1, 2)),
 )
+
+
+def _format_of(content: Named) -> Format | None:
+    return next((one for one in FORMATS if one.is_one(content)), None)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +21,6 @@ from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rectification import Rectification, Side
 from pelorus.wire.frames import Camera, Header, header_name
-from pelorus.wire.layout import Floats
 
 SAME = 1e-9  # a smaller error counts as rectified
 
@@ -44,15 +44,25 @@ class Rig:
 
     @classmethod
     def of_cameras(
-        cls, path: Path, first: Lens, second: Lens, T_21: Poses, T_1B: Poses | None = None
+        cls,
+        path: Path,
+        first: Lens,
+        second: Lens,
+        T_21: Poses,
+        T_1B: Poses | None = None,
+        topics: Sequence[str] = (),
     ) -> Rig:
-        """Returns the rig of two cameras; whichever stands on the left becomes the left one."""
+        """Returns the rig of two cameras; whichever stands on the left becomes the left one.
+
+        `topics` are of the first and the second one.
+        """
         arrays.require_baseline(path, float(np.linalg.norm(T_21.p)))
         x = -(T_21.R.T @ T_21.p)[0]
         if x > 0:
-            return cls(path, first, second, T_21, T_1B)
+            return cls(path, first, second, T_21, T_1B, topics=tuple(topics))
         T_2B = None if T_1B is None else se3.compose(T_21, T_1B)
-        return cls(path, second, first, se3.inverse(T_21), T_2B, swapped=True)
+        ordered = tuple(reversed(topics))
+        return cls(path, second, first, se3.inverse(T_21), T_2B, swapped=True, topics=ordered)
 
     def on_body(self, T_LB: Poses) -> Rig:
         return replace(self, T_LB=T_LB)
@@ -102,10 +112,9 @@ class Rig:
         if self.T_LB is None:
             raise ForeignFileError(
                 self.path,
-                "does not say where the camera sits on the body",
-                expected="a file with T_cam_imu or T_imu_cam is expected (camchain-imucam), or "
-                "--extrinsic "
-                "FILE: JSON with R_CB and t_CB_m, or R_BC and t_BC_m",
+                "does not say where the camera sits on the body; a file with T_cam_imu or "
+                "T_imu_cam is expected (camchain-imucam), or --extrinsic FILE: JSON with R_CB and "
+                "t_CB_m, or R_BC and t_BC_m",
             )
         R = rectification.left.R
         T_CB = Poses(R @ self.T_LB.R, R @ self.T_LB.p)
@@ -127,13 +136,3 @@ class Rig:
                 f"{self.path}: an offset of {self.offset_s} s brings the first picture before 0 s"
             )
         return shifted
-
-
-def rigid(path: Path, name: str, matrix: Floats) -> Poses:
-    """Returns a 4 x 4 matrix as a pose; its rotation, which files round, is made exact."""
-    if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
-        raise ForeignFileError(
-            path, f"the last row of {name} is {matrix[3]}", expected="0 0 0 1 is expected"
-        )
-    R = arrays.rotation(path, name, matrix[:3, :3])
-    return Poses(se3.nearest_rotation(R), matrix[:3, 3].copy())

@@ -50,10 +50,9 @@ def rig(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str] = ()) -> 
     chosen = pair(path, cameras, asked)
     first, second = cameras[chosen.first], cameras[chosen.second]
     T_21 = se3.compose(second.T, se3.inverse(first.T))
-    found = Rig.of_cameras(path, first.lens, second.lens, T_21, first.T)
     topics = [name for one in (first, second) for name in one.names if name.startswith("/")]
-    ordered = tuple(reversed(topics)) if found.swapped else tuple(topics)
-    return replace(found, topics=ordered, remarks=chosen.remarks)
+    found = Rig.of_cameras(path, first.lens, second.lens, T_21, first.T, topics)
+    return replace(found, remarks=chosen.remarks)
 
 
 def pair(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str] = ()) -> Chosen:
@@ -85,14 +84,12 @@ def _asked(path: Path, cameras: Sequence[RigCamera], asked: Sequence[str]) -> tu
         if len(of_name) != 1:
             listed = ", ".join(camera.words for camera in cameras)
             raise ForeignFileError(
-                path, f"has no camera called {name}", expected=f"there are: {listed} (--cameras)"
+                path, f"has no camera called {name}; there are: {listed} (--cameras)"
             )
         found += of_name
     if len(found) != 2 or found[0] == found[1]:
         raise ForeignFileError(
-            path,
-            f"--cameras {','.join(asked)}",
-            expected="two cameras, parted by a comma, are expected",
+            path, f"--cameras {','.join(asked)}; two cameras, parted by a comma, are expected"
         )
     return found[0], found[1]
 

@@ -55,8 +55,8 @@ def pairs(left: Path, right: Path, remarks: list[str] | None = None) -> list[Pai
     if remarks is None or too_many_alone(len(lefts.keys() & rights.keys()), len(alone)):
         _require_partners(left, lefts, right, rights)
         _require_partners(right, rights, left, lefts)
-    elif alone:
-        remarks.append(f"{len(alone)} pictures have no partner and are left out")
+    else:
+        remarks += _left_out(len(alone))
         lefts = {name: path for name, path in lefts.items() if name in rights}
     if len(lefts) < PAIRS_MIN:
         raise PelorusError(
@@ -106,15 +106,30 @@ def is_whole(path: Path) -> bool:
     return bool(end) and (path.suffix.lower() != ".png" or b"IEND" in end)
 
 
-def together(left_ns: Times, right_ns: Times, apart_ns: int) -> NDArray[np.intp]:
-    """(n, 2) indices of pictures that are each other's nearest in time, and near enough."""
-    if not len(left_ns) or not len(right_ns):
-        return np.empty((0, 2), np.intp)
-    left = np.arange(len(left_ns))
-    right = motion.nearest(right_ns, left_ns)
-    mutual = motion.nearest(left_ns, right_ns)[right] == left
-    near = np.abs(right_ns[right] - left_ns) <= apart_ns
-    return np.asarray(np.stack((left, right), axis=-1)[mutual & near], np.intp)
+class Together(NamedTuple):
+    """Indices (n, 2) of pictures that were taken together, and how many have no partner."""
+
+    pairs: NDArray[np.intp]
+    alone: int
+
+    @property
+    def remarks(self) -> list[str]:
+        return _left_out(self.alone)
+
+
+def together(left_ns: Times, right_ns: Times, apart_ns: int) -> Together:
+    """Returns pictures that are each other's nearest in time, and near enough."""
+    pairs = np.empty((0, 2), np.intp)
+    if len(left_ns) and len(right_ns):
+        left, right = np.arange(len(left_ns)), motion.nearest(right_ns, left_ns)
+        mutual = motion.nearest(left_ns, right_ns)[right] == left
+        near = np.abs(right_ns[right] - left_ns) <= apart_ns
+        pairs = np.asarray(np.stack((left, right), axis=-1)[mutual & near], np.intp)
+    return Together(pairs, len(left_ns) + len(right_ns) - 2 * len(pairs))
+
+
+def _left_out(alone: int) -> list[str]:
+    return [f"{alone} pictures have no partner and are left out"] if alone else []
 
 
 def too_many_alone(pairs: int, alone: int) -> bool:
@@ -169,9 +184,7 @@ def _times_in(file: Path, count: int) -> Times:
     seconds = foreign.numbers(file, foreign.rows(file), 1)[:, 0]
     if len(seconds) != count:
         raise ForeignFileError(
-            file,
-            f"has {len(seconds)} times",
-            expected=f"{count} are expected, one for each pair of pictures",
+            file, f"has {len(seconds)} times; {count} are expected, one for each pair of pictures"
         )
     return arrays.nanoseconds(file, "time", seconds)
 
@@ -228,9 +241,7 @@ def in_order(found: Iterable[Pair], bits: int = 16) -> Iterator[tuple[Gray, Gray
 def _require_shape(path: Path, image: Gray, expected: tuple[int, ...], who: str) -> None:
     if image.shape != expected:
         raise ForeignFileError(
-            path,
-            f"has {_size(image.shape)} pixels",
-            expected=f"{_size(expected)} are expected, which {who}",
+            path, f"has {_size(image.shape)} pixels; {_size(expected)} are expected, which {who}"
         )
 
 
@@ -240,22 +251,21 @@ def require_alike(path: Path, image: Gray, first: Gray) -> None:
     _require_side(path, image.shape)
 
 
-def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> None:
-    """A picture must be as large as its calibration says: (width, height), 0 where it does not."""
-    if known[0] and (shape[1], shape[0]) != known:
+def require_size(path: Path, shape: tuple[int, ...], sizes: Sequence[tuple[int, int]]) -> None:
+    """A picture has one of the sizes that its calibration says: (width, height), 0 if unknown."""
+    known = sizes[0]
+    if known[0] and (shape[1], shape[0]) not in sizes:
         raise ForeignFileError(
             path,
-            f"the pictures have {_size(shape)} pixels",
-            expected=f"{known[0]} x {known[1]} are expected, for which the calibration was made",
+            f"the pictures have {_size(shape)} pixels; {known[0]} x {known[1]} are expected, for "
+            "which the calibration was made",
         )
 
 
 def _require_side(path: Path, shape: tuple[int, ...]) -> None:
     if min(shape) < SIDE_MIN_PX:
         raise ForeignFileError(
-            path,
-            f"has {_size(shape)} pixels",
-            expected=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are expected",
+            path, f"has {_size(shape)} pixels; at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are expected"
         )
 
 
@@ -288,9 +298,7 @@ def unpacked(path: Path, packed: bytes) -> NDArray[np.integer[Any]]:
         pixels = np.asarray(image if wide else image.convert("L"))
     except Exception as error:  # its decoders raise a dozen kinds on damaged files
         raise ForeignFileError(
-            path,
-            f"cannot be read as a picture: {error}",
-            expected="a whole PNG, JPEG or PGM is expected",
+            path, f"cannot be read as a picture: {error}; a whole PNG, JPEG or PGM is expected"
         ) from error
     _require_side(path, pixels.shape)
     return pixels

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from pelorus.errors import PelorusError
+from pelorus.io.named import Named
 from pelorus.math import se3
 from pelorus.math.se3 import IDENTITY, Poses
 from pelorus.online.pipeline import header_of
@@ -16,7 +17,7 @@ from pelorus.rig import read as rig_files
 from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
-from pelorus.rig.rig import Rig, rigid
+from pelorus.rig.rig import Rig
 
 from pelorus_ros.mounting import Mounting, NoChain, bare
 from pelorus_ros.parameters import Options
@@ -160,4 +161,4 @@ def matrix(name: str, numbers: list[float]) -> Poses | None:
     """Returns the 4 x 4 by rows as a pose; None where it was not given."""
     if len(numbers) != 16:
         return None
-    return rigid(Path(f"parameter {name}"), name, np.array(numbers, np.float64).reshape(4, 4))
+    return Named(Path(f"parameter {name}"), {name: list(numbers)}).pose(name)
