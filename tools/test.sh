@@ -236,6 +236,9 @@ joined
 step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" --dist worksteal \
     tests/python
 
+# Compiles the tests, and finds them, once: else each of pytest's processes would, at the same time.
+beside 'Python tests, found' "$VENV/bin/python" -m pytest -q --collect-only tests/python
+
 if [ $extent != quick ]; then
     # Beside the builds and tests that follow: some tests on emulated boards wait for silence.
     beside 'microcontroller' tests/target/run.sh
