@@ -205,8 +205,16 @@ if [ $extent != quick ]; then
     clang=$(command -v clang-14 || command -v clang)
     replays=(-DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON)
     beside 'Python environment' ensure_python
-    beside 'build: clang' by_one_job build_replays clang "${replays[@]}" -DCMAKE_C_COMPILER="$clang"
-    beside 'build: less optimised' by_one_job build_replays o2 "${replays[@]}"
+    # Another compiler and less optimised: in one build, and by gcc, too, with --long.
+    clangs=("${replays[@]}" -DCMAKE_C_COMPILER="$clang")
+    builds=(build build-clang build-portable)
+    if [ $extent = long ]; then
+        builds+=(build-o2)
+        beside 'build: less optimised' by_one_job build_replays o2 "${replays[@]}"
+    else
+        clangs+=('-DCMAKE_C_FLAGS_RELEASE=-O2 -DNDEBUG')
+    fi
+    beside 'build: clang' by_one_job build_replays clang "${clangs[@]}"
     joined
 fi
 ensure_python # there by now; if not, it says why and ends this
@@ -263,8 +271,7 @@ if [ $extent != quick ]; then
     step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_INSTALL=OFF \
         -DPELORUS_TEST_BLOCKS=OFF "${kinds[@]+"${kinds[@]}"}" -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
-    step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
-        build build-clang build-portable build-o2
+    step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py "${builds[@]}"
     if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then
         step 'fuzz the reader' fuzz 120 fuzz_reader tests/fuzz/corpus 4096
         step 'fuzz the session' fuzz 300 fuzz_session tests/fuzz/corpus_session 8192
