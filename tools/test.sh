@@ -236,6 +236,9 @@ fi
 
 # --- the desktop ---------------------------------------------------------------------------------
 
+# Compiles the tests, and finds them, once: else each of pytest's processes would, at the same time.
+beside 'Python tests, found' "$VENV/bin/python" -m pytest -q --collect-only tests/python
+
 step 'build: gcc' build_preset release "${strict[@]}"
 built=$?
 joined
@@ -243,9 +246,6 @@ joined
 [ $extent = long ] && beside 'ROS 2 node' tools/ros2.sh # its environment and its tests take five minutes
 step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" --dist worksteal \
     tests/python
-
-# Compiles the tests, and finds them, once: else each of pytest's processes would, at the same time.
-beside 'Python tests, found' "$VENV/bin/python" -m pytest -q --collect-only tests/python
 
 if [ $extent != quick ]; then
     # Beside the builds and tests that follow: some tests on emulated boards wait for silence.
@@ -261,13 +261,15 @@ if [ $extent != quick ]; then
     # Of these two nothing is installed, and no library built that nothing links. Memory and undefined
     # behaviour are the same source in float64: its tests are built with --long, and one with other blocks always.
     reals=()
-    [ $extent = long ] || reals=(-DPELORUS_TEST_REALS=f32)
+    [ $extent = long ] || reals=(-DPELORUS_TEST_REALS=f32 -DPELORUS_TESTS_ALONE=ON)
     step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF "${reals[@]+"${reals[@]}"}" &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
     # Another compiler, and without a fused multiply-add instruction. Where the golden tests and the units
-    # compute the same bits, so would the long drives: they are built with --long alone, for their warnings.
+    # compute the same bits, so would the long drives: they are built with --long alone, for their warnings. So
+    # are the programs that nothing runs and libraries that check themselves, which gcc's two builds do.
     kinds=()
-    [ $extent = long ] || kinds=('-DPELORUS_TEST_KINDS=unit;golden')
+    [ $extent = long ] ||
+        kinds=('-DPELORUS_TEST_KINDS=unit;golden' -DPELORUS_TESTS_ALONE=ON -DPELORUS_TEST_ASSERTIONS=OFF)
     step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_INSTALL=OFF \
         -DPELORUS_TEST_BLOCKS=OFF "${kinds[@]+"${kinds[@]}"}" -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
