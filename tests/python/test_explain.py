@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
+from draws import draws
 from pelorus.check import verdict as verdicts
 from pelorus.errors import PelorusError
 from pelorus.explain import Explanation, explain
@@ -335,7 +336,7 @@ def test_a_robot_that_answers_late_is_explained_alike(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("by_imu", [False, True])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", draws(range(6)))
 def test_whatever_stands_in_a_log_no_number_warns(tmp_path: Path, seed: int, by_imu: bool) -> None:
     chance = np.random.default_rng(seed)
     wild = np.array([np.nan, np.inf, -np.inf, 1e38, -1e38, 0.0, 1e7])

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from draws import draws
 from drives import (
     FORWARD_RIGHT_DOWN,
     at_rest,
@@ -23,7 +24,7 @@ from pelorus.wire.frames import BodyAxes, TwistTiming
 from pelorus.wire.layout import Floats
 from pelorus_course import timing
 
-SEEDS = [1, 2]
+SEEDS = draws([1, 2])
 STALE = range(7, 590, 9)
 
 

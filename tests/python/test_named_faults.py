@@ -58,26 +58,35 @@ def test_a_unit_is_named_whichever_way_it_was_mistaken(simulated: Recording, by:
     assert [fault.name for fault in said] == ["unit-km/h"]
 
 
-@pytest.mark.parametrize("name", ["inverted", "degrees", "mm/s"])
-def test_points_that_come_back_are_no_slots_where_the_twists_are_wrong(
-    simulated: Recording, name: str
-) -> None:
-    """Twists that are wrong put every point elsewhere: where it must be is what the images say."""
+@pytest.fixture(scope="module")
+def blinking(simulated: Recording) -> Recording:
     tracks = simulated.tracks
     keep = (tracks.frame + tracks.id) % 7 > 1
-    blinking = replace(simulated, tracks=type(tracks)(
+    return replace(simulated, tracks=type(tracks)(
         tracks.frame_count, tracks.frame[keep], tracks.id[keep], tracks.pixels[keep]))  # fmt: skip
+
+
+def test_points_that_come_back_are_no_slots(blinking: Recording) -> None:
     assert found_in(blinking) == []
+
+
+@pytest.mark.parametrize("name", ["inverted", "degrees", "mm/s"])
+def test_points_that_come_back_are_no_slots_where_the_twists_are_wrong(
+    blinking: Recording, name: str
+) -> None:
+    """Twists that are wrong put every point elsewhere: where it must be is what the images say."""
     change, due = OF_RECORDINGS[name]
     assert found_in(change(blinking, 0))[0].name in due
 
 
+def test_a_clean_piece_of_a_real_recording_has_no_faults(of_03: Converted) -> None:
+    assert found_in(piece(of_03.recording, 300)) == []
+
+
 @pytest.mark.parametrize("name", ["axes", "pitch", "degrees", "km/h", "u-v", "ids-slots"])
 def test_a_fault_in_a_real_recording_is_named(of_03: Converted, name: str) -> None:
-    clean = piece(of_03.recording, 300)
-    assert found_in(clean) == []
     change, due = OF_RECORDINGS[name]
-    assert found_in(change(clean, 1))[0].name in due
+    assert found_in(change(piece(of_03.recording, 300), 1))[0].name in due
 
 
 @pytest.mark.parametrize(
@@ -166,6 +175,9 @@ def test_a_fault_of_the_clock_is_named(name: str, strength: int) -> None:
     messages = of_times(drive(60), strength, name)
     found = judged_of(messages, recording_of(messages)).faults
     assert name in [fault.name for fault in found], found
+
+
+def test_the_same_drive_by_a_right_clock_has_no_faults() -> None:
     assert judged_of(drive(60), recording_of(drive(60))).faults == []
 
 
