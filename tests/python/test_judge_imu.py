@@ -13,7 +13,7 @@ from pelorus.evaluate import evaluation, inertial_evaluation
 from pelorus.evaluate.evaluation import judge
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
-from pelorus.simulate.scene import CAMERA
+from pelorus.simulate.sensors import CAMERA
 from pelorus.wire.frames import Config, Header, Message, Pose, Stereo, Truth, TruthKnows
 from pelorus.wire.layout import Floats, pack_symmetric
 from pelorus.wire.settings import IDS

@@ -13,7 +13,7 @@ from pelorus.check.known import Known
 from pelorus.check.verdict import Grade, Verdict, judged_log
 from pelorus.evaluate.evaluation import judge, path_m
 from pelorus.explain import Explanation, explain
-from pelorus.explain.incident import Cause, Incident
+from pelorus.explain.log import Cause, Incident
 from pelorus.fleet.row import finite
 from pelorus.io.trajectory import Trajectory, estimate_in, truth_in
 from pelorus.math.consistency import Figures
