@@ -15,13 +15,13 @@ from pelorus.commands.choices import PROGRAMS, SETTINGS, settings_given
 from pelorus.commands.verdicts import VERDICT_COLOURS
 from pelorus.errors import Existing, PelorusError
 from pelorus.fleet import table
-from pelorus.fleet.journal import Journal
+from pelorus.fleet.table import Journal
 from pelorus.program.console import err, out, print_json, tally, waiting
 
 if TYPE_CHECKING:
     from pelorus.fleet.examine import Work
-    from pelorus.fleet.ranking import Ranking
-    from pelorus.fleet.row import Found, Row
+    from pelorus.fleet.page import Ranking
+    from pelorus.fleet.table import Found, Row
 
 PATTERNS = ("*.plr", "*.plr.zst")
 TABLE = ".parquet"
@@ -112,7 +112,7 @@ def fleet(
 
 
 def _recordings(folder: Path) -> list[Found]:
-    from pelorus.fleet.row import Found  # noqa: PLC0415 - with its caller
+    from pelorus.fleet.table import Found  # noqa: PLC0415 - with its caller
 
     if not folder.is_dir():
         raise PelorusError(f"{folder}: a folder of recordings is expected, or a {TABLE} table")
@@ -181,8 +181,7 @@ def _shown(
     folder: Path | None,
 ) -> Ranking:
     """Returns the ranking, and writes its page if one is wanted."""
-    from pelorus.fleet.page import write_page  # noqa: PLC0415 - loads slowly
-    from pelorus.fleet.ranking import rank  # noqa: PLC0415 - as above
+    from pelorus.fleet.page import rank, write_page  # noqa: PLC0415 - loads slowly
 
     ranking = rank(rows, before)
     if page is not None:

@@ -19,14 +19,13 @@ from pelorus.native.replay import find_programs
 from pelorus.program.console import err, out, print_json, progress, step, steps, waiting
 from pelorus.program.extras import figures_missing
 from pelorus.report import words
-from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
+from pelorus.report.comparison import carry_out, plan_runs, read_subject, require_twists
 
 if TYPE_CHECKING:
     from pelorus.check.verdict import Verdict
     from pelorus.io.trajectory import Trajectory
-    from pelorus.report.comparison import Comparison
+    from pelorus.report.comparison import Comparison, Run
     from pelorus.report.curves import Other
-    from pelorus.report.results import Run
 
 PAGE = "report.html"
 STEPS = 3

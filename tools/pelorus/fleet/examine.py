@@ -19,9 +19,17 @@ from pelorus.check.checked import check
 from pelorus.check.options import options_of
 from pelorus.errors import PelorusError, made
 from pelorus.evaluate.evaluation import judge, path_m
-from pelorus.fleet.pieces import PIECE_BYTES, holds_answers, in_pieces
-from pelorus.fleet.row import Found, Row, finite
-from pelorus.fleet.whole import EVALUATED, Course, Part, columns_of, is_answered
+from pelorus.fleet.table import Found, Row, finite
+from pelorus.fleet.whole import (
+    EVALUATED,
+    PIECE_BYTES,
+    Course,
+    Part,
+    columns_of,
+    holds_answers,
+    in_pieces,
+    is_answered,
+)
 from pelorus.io.trajectory import estimate_in
 from pelorus.math.consistency import Figures
 from pelorus.native.replay import Outputs, find_programs, replay

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from pelorus.check.verdict import NOISES, Verdict
 from pelorus.explain.explanation import Episode, Explanation
 from pelorus.explain.log import log_of
-from pelorus.report.about import tables_of
+from pelorus.report.beside import tables_of
 from pelorus.report.footage import CAPTION, Footage
 from pelorus.report.page import Answer, Event, PageTable
 from pelorus.report.spectra import drawings
