@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, settings_given
-from pelorus.commands.verdicts import VERDICT_COLOURS
+from pelorus.commands.outputs import VERDICT_COLOURS
 from pelorus.errors import write_text
 from pelorus.native.replay import find_programs
 from pelorus.program.console import out, print_json, steps

@@ -17,7 +17,7 @@ from pelorus.flight.judge import BitsVerdict, Desk, Judgement, judge, of_this_ve
 from pelorus.flight.log import NOWHERE, Frame, read_log
 from pelorus.native.replay import find_programs
 from pelorus.program.console import err, out, print_json
-from pelorus.robot.status import condition
+from pelorus.robot.stream import condition
 from pelorus.wire.frames import Config
 from pelorus.wire.schema import STATUSES
 

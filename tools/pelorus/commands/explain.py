@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pelorus.commands.choices import CALIBRATION, LOG, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.commands.verdicts import tell_verdict
+from pelorus.commands.choices import (
+    CALIBRATION,
+    CONFIG,
+    LOG,
+    PICTURES,
+    PROGRAMS,
+    SETTINGS,
+    replay_options,
+)
+from pelorus.commands.outputs import tell_verdict
 from pelorus.native.replay import whole_log_of
 from pelorus.program.console import out, print_json, waiting
 
@@ -41,9 +49,7 @@ def explain(
         help="Of a recording: the same, or that of --beside, with another setting; repeatable.",
     ),
     as_json: bool = typer.Option(False, "--json", help="All of it as one JSON object."),
-    config: Path | None = typer.Option(
-        None, metavar="FILE", help="Settings for a recording, as pelorus-replay takes them."
-    ),
+    config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
 ) -> None:

@@ -11,8 +11,8 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.commands.choices import PROGRAMS, SETTINGS, settings_given
-from pelorus.commands.verdicts import VERDICT_COLOURS
+from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, settings_given
+from pelorus.commands.outputs import VERDICT_COLOURS
 from pelorus.errors import Existing, PelorusError
 from pelorus.fleet import table
 from pelorus.fleet.table import Journal
@@ -71,9 +71,7 @@ def fleet(
     checked: bool = typer.Option(
         True, "--check/--no-check", help="Look for settings, too: a minute for one of driving."
     ),
-    config: Path | None = typer.Option(
-        None, metavar="FILE", help="Settings for the recordings, as pelorus-replay takes them."
-    ),
+    config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
     as_json: bool = typer.Option(False, "--json", help="The answer, or the ranking, as JSON."),

@@ -16,7 +16,7 @@ from rich.markup import escape
 
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
-from pelorus.commands.conversion import write
+from pelorus.commands.outputs import write
 from pelorus.converters import bag, csv, euroc, kitti, ros, streams, with_pictures
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns

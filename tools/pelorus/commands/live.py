@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import typer
 from rich.markup import escape
 
-from pelorus.commands.another import run_command
-from pelorus.commands.choices import CONFIG, SETTINGS, settings_given
-from pelorus.commands.watching import VIEW, watching
+from pelorus.commands.choices import CONFIG, SETTINGS, VIEW, settings_given, watching
+from pelorus.commands.outputs import run_command
 from pelorus.errors import Existing, PelorusError
 from pelorus.live.camera import CAMERAS, Asked, Camera, open_camera
 from pelorus.live.port import FORMS

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.commands.verdicts import tell_verdict
+from pelorus.commands.outputs import tell_verdict
 from pelorus.errors import Existing, PelorusError, made, whole_folder
 from pelorus.io.trajectory import read_stamped
 from pelorus.native.replay import find_programs

@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 import typer
 
 from pelorus.commands.choices import Timing
-from pelorus.commands.conversion import write
+from pelorus.commands.outputs import write
 from pelorus.errors import PelorusError
 from pelorus.io.recording import Recording
 from pelorus.io.small_sensors import SMALL_SENSORS, SmallSensor

@@ -13,17 +13,13 @@ from typing import BinaryIO
 import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from pelorus.commands.choices import PROGRAMS
+from pelorus.commands.choices import PROGRAMS, VIEW, watching
 from pelorus.commands.compare import compare_log
-from pelorus.commands.watching import VIEW, watching
 from pelorus.errors import PelorusError, writing
 from pelorus.flight.judge import BitsVerdict
 from pelorus.program.console import err, one_line, out
-from pelorus.robot.emulator import MACHINES
-from pelorus.robot.state import restored, saved
-from pelorus.robot.status import refusal
-from pelorus.robot.stream import ANSWER_S, Streamer, StreamResult
-from pelorus.robot.target import BAUD, FORMS, open_target
+from pelorus.robot.emulator import BAUD, FORMS, MACHINES, open_target
+from pelorus.robot.stream import ANSWER_S, Streamer, StreamResult, refusal, restored, saved
 from pelorus.wire import packed_file
 from pelorus.wire.frames import Kind, Message, Pose
 from pelorus.wire.framing import header_of, read_file

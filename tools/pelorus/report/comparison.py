@@ -27,12 +27,10 @@ import numpy as np
 from pelorus.errors import PelorusError
 from pelorus.evaluate.evaluation import (
     Accuracy,
-    assess,
-    by_imu,
+    accuracy_of,
     judge,
     known_in,
     made_in,
-    on_its_clock,
     sigmas_m,
 )
 from pelorus.evaluate.frame_table import FrameTable, frame_table
@@ -252,15 +250,7 @@ class Comparison:
         truth = self.subject.truth
         if truth is None:
             return {}
-        found = {
-            run.name: assess(
-                run.trajectory,
-                on_its_clock(run.messages, truth, run.trajectory),
-                run.covariance,
-                upright=by_imu(run.messages),
-            )
-            for run in self.runs
-        }
+        found = {run.name: accuracy_of(run.messages, truth) for run in self.runs}
         return {name: accuracy for name, accuracy in found.items() if accuracy is not None}
 
     @cached_property

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from pelorus.evaluate.evaluation import Accuracy, assess, by_imu, on_its_clock
+from pelorus.evaluate.evaluation import Accuracy, accuracy_of
 from pelorus.evaluate.frame_table import FrameTable, frame_table
 from pelorus.evaluate.health import GOOD, NOT_STARTED, SHORT
 from pelorus.grid.plane import AXES, choose
-from pelorus.io.trajectory import POSE_SIZE, Trajectory, estimate_in, truth_in
+from pelorus.io.trajectory import POSE_SIZE, Trajectory, estimate_in
 from pelorus.math.ellipsoids import ellipsoids
 from pelorus.math.motion import Times, nearest
 from pelorus.report.landmarks import WHY, Landmarks, packed
@@ -70,10 +70,8 @@ class Curves:
         self._messages = messages
         self._frames = self._thinned(frame_table(messages))
         self._t = self._seconds(self._frames.t_ns)
-        found = estimate_in(messages)
-        self._found = found
-        truth = truth_in(messages) if truth is None else truth
-        self.accuracy = _accuracy(messages, found, truth)
+        self._found = estimate_in(messages)
+        self.accuracy = accuracy_of(messages, truth)
 
     @property
     def origin_ns(self) -> int:
@@ -442,14 +440,3 @@ def _words() -> dict[str, Any]:
         "status": {str(k): words.partition(":")[0] for k, words in schema.STATUSES.items()},
         "why": {str(k): words for k, words in WHY.items()},
     }
-
-
-def _accuracy(
-    messages: Sequence[Message],
-    found: tuple[Trajectory, Floats] | None,
-    truth: Trajectory | None,
-) -> Accuracy | None:
-    if found is None or truth is None:
-        return None
-    on_clock = on_its_clock(messages, truth, found[0])
-    return assess(found[0], on_clock, found[1], upright=by_imu(messages))
