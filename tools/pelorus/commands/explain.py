@@ -97,8 +97,6 @@ def _write(
     from pelorus.report import answers  # noqa: PLC0415
     from pelorus.report.beside import NamedLog, drift_table, side_by_side  # noqa: PLC0415
     from pelorus.report.curves import Curves  # noqa: PLC0415
-    from pelorus.report.footage import footage  # noqa: PLC0415
-    from pelorus.report.page import write  # noqa: PLC0415
 
     facts = ""
     if other is None:
@@ -113,7 +111,4 @@ def _write(
         tables = [*side_by_side(first, second), *drift_table([first, second])]
         facts = f"Dashed curves are those of {other[0]}."
     answer = answers.of_explanation(found, name, tables, facts)
-    answer = answers.with_setup(answer, messages)
-    if pictures is not None:
-        answer = answers.with_footage(answer, footage(messages, found, pictures, calibration))
-    write(page, answer, curves)
+    answers.write_page(page, answer, curves, found, pictures, calibration)

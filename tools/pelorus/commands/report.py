@@ -117,10 +117,9 @@ def _draw(
 ) -> tuple[Verdict, list[str]]:
     """Writes pictures and page; returns the page's verdict, and further remarks."""
     from pelorus.explain import explain  # noqa: PLC0415 - as above
-    from pelorus.report import answers, page  # noqa: PLC0415 - as above
+    from pelorus.report import answers  # noqa: PLC0415 - as above
     from pelorus.report.beside import NamedLog, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
-    from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
     step("pictures")
     shown = _draw_pictures(compared, folder)
@@ -140,10 +139,7 @@ def _draw(
         verdict = found.verdict
     drift = drift_table([NamedLog(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
-    answer = answers.with_setup(answer, main.messages)
-    if source is not None:
-        answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
-    page.write(folder / PAGE, answer, curves)
+    answers.write_page(folder / PAGE, answer, curves, found, source, calibration)
     return verdict, lines
 
 

@@ -38,6 +38,7 @@ from pelorus.wire.settings import describe
 SAME_MOST = 10  # identical successive readings that the filter allows
 GRAVITY_OFF_MPS2 = 1.0
 GAP_RATIO = 1.5  # an interval that exceeds the median one by this ratio is a gap
+DAMAGE = ("damaged", "missing", "malformed", "unknown", "too_long")  # of Counts
 DATA = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.POSE)
 
 
@@ -300,13 +301,7 @@ def survey_json(found: Survey) -> dict[str, Any]:
         },
         "sensors": {
             name: _stream_json(sensor.stream, origin)
-            | {
-                "axes": sensor.axes,
-                "sigma": sensor.sigma,
-                "ranges": sensor.ranges,
-                "places_B_m": sensor.places_B_m,
-                "zero_s": sensor.zero_s,
-            }
+            | {key: value for key, value in vars(sensor).items() if key != "stream"}
             for name, sensor in found.sensors.items()
         },
         "calibrated": found.calibrated.figures if found.calibrated else None,
@@ -316,11 +311,7 @@ def survey_json(found: Survey) -> dict[str, Any]:
         "texts": [{"severity": text.severity, "text": text.text} for text in found.texts],
         "remarks": found.remarks,
         "damage": {
-            "damaged": counts.damaged,
-            "missing": counts.missing,
-            "malformed": counts.malformed,
-            "unknown": counts.unknown,
-            "too_long": counts.too_long,
+            **{name: getattr(counts, name) for name in DAMAGE},
             "faults": [fault._asdict() for fault in counts.faults],
         },
     }

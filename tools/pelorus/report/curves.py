@@ -67,7 +67,7 @@ class Curves:
         self.left_out: list[str] = []
         self._others = others or {}
         self._beside = beside
-        self._messages = messages
+        self.messages = messages
         self._frames = self._thinned(frame_table(messages))
         self._t = self._seconds(self._frames.t_ns)
         self._found = estimate_in(messages)
@@ -111,7 +111,7 @@ class Curves:
             "charts": [self._packed(chart) for chart in self._charts()],
             "map": self._map(),
             "landmarks": Landmarks(
-                self._messages, self.origin_ns, self._found and self._found[0], self.packer
+                self.messages, self.origin_ns, self._found and self._found[0], self.packer
             ).json(self.left_out),
         }
 
@@ -293,7 +293,7 @@ class Curves:
             yield self._chart(title, unit, about, lines)
 
     def _true_biases(self) -> tuple[Floats, Floats]:
-        known = [m for m in self._messages if isinstance(m, Truth) and m.knows & TruthKnows.BIAS]
+        known = [m for m in self.messages if isinstance(m, Truth) and m.knows & TruthKnows.BIAS]
         if not known:
             nothing = np.full((len(self._t), 3), np.nan)
             return nothing, nothing
@@ -325,7 +325,7 @@ class Curves:
         return self._chart("Timing", "ms", about, lines, log=True)
 
     def _evidence(self) -> Iterator[dict[str, Any]]:
-        evidence = {m.t_ns: m for m in self._messages if isinstance(m, Evidence)}
+        evidence = {m.t_ns: m for m in self.messages if isinstance(m, Evidence)}
         if not evidence:
             return
         rows = [evidence.get(t) for t in self._frames.t_ns.tolist()]
@@ -359,7 +359,7 @@ class Curves:
         if self._found is None:
             return {"tracks": [], "axes": [0, 1]}
         trajectory = self._found[0]
-        plane = choose(header_of_messages(self._messages).body_axes, trajectory.poses)
+        plane = choose(header_of_messages(self.messages).body_axes, trajectory.poses)
         tracks = [self._track("estimate", trajectory.t_ns, trajectory.poses.p)]
         if self.accuracy is not None:
             tracks.append(self._track("truth", self.accuracy.t_ns, self.accuracy.truth.p))

@@ -14,7 +14,7 @@ from pelorus.io.recording import Recording
 from pelorus.math.inertial import GRAVITY_MPS2, Inertial
 from pelorus.math.motion import Times
 from pelorus.simulate import drive, sensors, settings
-from pelorus.simulate.drive import Drive, exp, wave
+from pelorus.simulate.drive import Drive, wave
 from pelorus.simulate.settings import (
     BELOW_ONE,
     FINITE,
@@ -288,7 +288,7 @@ def driven(
         inertial=sensed.readings._replace(t_ns=sensed.readings.t_ns + late_ns),
         imu_batch=given.imu.imu_batch,
         twist_delay_ns=round(given.faults.imu_delay_s * 1e9),
-        start=_later(_start(recording, given, chance), late_ns),
+        start=_start(recording, given, chance, late_ns),
         truth_velocity=given.way.velocities(drive.seconds(recording.truth_t_ns))[0],
         truth_bias=_biases(sensed, recording.truth_t_ns),
     )
@@ -321,7 +321,9 @@ def _noise(noise: Noise, given: ImuDrive) -> Noise:
     return Noise(**kept, **suggested, gravity=imu.gravity_mps2)
 
 
-def _start(recording: Recording, given: ImuDrive, chance: np.random.Generator) -> Start | None:
+def _start(
+    recording: Recording, given: ImuDrive, chance: np.random.Generator, late_ns: int
+) -> Start | None:
     """Returns the first pose, with errors of roll, pitch and velocity by their sigmas.
 
     Position and yaw are exact, for nothing can be learnt of them.
@@ -338,8 +340,8 @@ def _start(recording: Recording, given: ImuDrive, chance: np.random.Generator) -
     covariance: Floats = np.zeros((6, 6))
     covariance[3:, 3:] = imu.start_tilt_sigma_rad**2 * tilt
     start = Start(
-        int(recording.truth_t_ns[0]),
-        _turned(wrong) @ R,
+        int(recording.truth_t_ns[0]) + late_ns,
+        drive.exp(np.zeros((1, 3)), wrong[None]).R[0] @ R,
         p,
         StartFlag.COVARIANCE,
         pack_symmetric(covariance),
@@ -348,13 +350,3 @@ def _start(recording: Recording, given: ImuDrive, chance: np.random.Generator) -
         return start
     variance = np.full(3, imu.start_velocity_sigma_mps**2)
     return replace(start, velocity=faulty, velocity_variance=variance)
-
-
-def _later(start: Start | None, by_ns: int) -> Start | None:
-    return None if start is None else replace(start, t_ns=start.t_ns + by_ns)
-
-
-def _turned(small: Floats) -> Floats:
-    """Returns Exp of a small rotation of the world."""
-    R: Floats = exp(np.zeros((1, 3)), small[None]).R[0]
-    return R
