@@ -13,8 +13,9 @@ import numpy as np
 from pelorus.evaluate.health import LOST, Spell, TimeLine, time_line
 from pelorus.explain.contradiction import contradictions
 from pelorus.explain.inputs import of_inputs, of_small, rejected
-from pelorus.explain.log import FEW, Cause, FilterLog, Flags, Incident, S, log_of, runs
+from pelorus.explain.log import FEW, Cause, FilterLog, Flags, Incident, S, log_of
 from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
+from pelorus.math.motion import runs
 from pelorus.wire import schema
 from pelorus.wire.frames import Kind, Message, Text
 

@@ -23,11 +23,10 @@ from pelorus.explain.log import (
     S,
     joined_runs,
     period,
-    runs,
     suspect,
 )
 from pelorus.io.small_sensors import name_of
-from pelorus.math.motion import Times
+from pelorus.math.motion import Times, runs
 from pelorus.tracking.visual_motion import PAIRS_MIN
 from pelorus.wire.frames import Message, Reading
 from pelorus.wire.layout import Floats

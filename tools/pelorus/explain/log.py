@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 from pelorus.io.trajectory import is_finite
-from pelorus.math.motion import Times
+from pelorus.math.motion import Times, runs
 from pelorus.wire import schema
 from pelorus.wire.evidence import Evidence, EvidenceFlag
 from pelorus.wire.frames import Header, Imu, Kind, Message, Pose, Report, Stereo, Twist
@@ -197,66 +197,66 @@ def _moved(first: Pixels, second: Pixels) -> tuple[int, float]:
     return repeated, float(np.median(np.hypot(*way.T))) if len(way) >= FEW else np.nan
 
 
+@dataclass
+class _Answered:
+    """A frame, and what a filter said of it."""
+
+    frame: Stereo
+    report: Report | None = None
+    pose: Pose | None = None
+    evidence: Evidence | None = None
+
+
 def log_of(messages: Sequence[Message]) -> FilterLog:
     """Reads a log; raises PelorusError where no frame was answered."""
-    frames, reports, poses, evidence = _answers(messages)
-    answered = [k for k, report in enumerate(reports) if report is not None]
-    if not answered:
+    frames = _answers(messages)
+    numbers = [k for k, one in enumerate(frames) if one.report is not None]
+    if not numbers:
         raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
+    answered = [frames[k] for k in numbers]
     behind, stamps, readings = _readings(messages)
+    refused = [m for m in messages if isinstance(m, Report) and m.status]
     return FilterLog(
         header_of_messages(messages),
-        [frames[k] for k in answered],
-        [report for report in reports if report is not None],
-        [poses[k] for k in answered],
-        [evidence[k] for k in answered],
-        behind[answered],
+        [one.frame for one in answered],
+        [one.report for one in answered if one.report is not None],
+        [one.pose for one in answered],
+        [one.evidence for one in answered],
+        behind[numbers],
         stamps,
         readings,
         any(isinstance(m, Imu) for m in messages),
-        [
-            m
-            for m in messages
-            if isinstance(m, Report) and m.subject in (Kind.TWIST, Kind.IMU) and m.status
-        ],
+        [m for m in refused if m.subject in (Kind.TWIST, Kind.IMU)],
         _sigma(messages, "velocity-sigma", "gyro-sigma"),
         _sigma(messages, "bias-velocity-sigma", "bias-gyro-sigma"),
     )
 
 
-def _answers(
-    messages: Sequence[Message],
-) -> tuple[list[Stereo], list[Report | None], list[Pose | None], list[Evidence | None]]:
+def _answers(messages: Sequence[Message]) -> list[_Answered]:
     """Returns all frames with their answers.
 
     A robot's answer comes late, and is matched by its time; a pose comes before its report,
     evidence after it.
     """
-    frames = [m for m in messages if isinstance(m, Stereo)]
-    reports: list[Report | None] = [None] * len(frames)
-    poses: list[Pose | None] = [None] * len(frames)
-    evidence: list[Evidence | None] = [None] * len(frames)
-    waiting: dict[int, list[int]] = {}
+    found: list[_Answered] = []
+    waiting: dict[int, list[_Answered]] = {}
     pose: Pose | None = None
-    last: int | None = None
-    arrived = 0
+    last: _Answered | None = None
     for m in messages:
         if isinstance(m, Stereo):
-            waiting.setdefault(m.t_ns, []).append(arrived)
-            arrived += 1
+            found.append(_Answered(m))
+            waiting.setdefault(m.t_ns, []).append(found[-1])
         elif isinstance(m, Pose) and m.after_stereo and is_finite(m):
             pose = m
         elif isinstance(m, Report) and m.subject == Kind.STEREO:
-            last = None
-            if asked := waiting.get(m.t_ns):
-                last = asked.pop(0)
-                reports[last], poses[last] = m, pose
-                if not asked:
-                    del waiting[m.t_ns]
+            asked = waiting.get(m.t_ns)
+            last = asked.pop(0) if asked else None
+            if last is not None:
+                last.report, last.pose = m, pose
             pose = None
         elif isinstance(m, Evidence) and last is not None:
-            evidence[last] = m
-    return frames, reports, poses, evidence
+            last.evidence = m
+    return found
 
 
 def _readings(messages: Sequence[Message]) -> tuple[Times, Times, Floats]:
@@ -299,13 +299,6 @@ def suspect(log: FilterLog) -> Flags:
 def period(t_ns: Times) -> float:
     """Returns the median interval, ns."""
     return float(np.median(np.abs(np.diff(t_ns)))) if len(t_ns) > 1 else 0.0
-
-
-def runs(flags: Flags) -> list[tuple[int, int]]:
-    """Returns first and last index of each stretch of True."""
-    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
-    begins, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0] - 1
-    return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
 def joined_runs(flags: Flags, t_ns: Times, apart_ns: int) -> list[tuple[int, int]]:

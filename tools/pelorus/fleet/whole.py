@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pelorus.check.known import Known
 from pelorus.check.verdict import Grade, Verdict, judged_log
 from pelorus.evaluate.evaluation import judge, path_m
 from pelorus.explain import Explanation, explain
@@ -97,21 +96,12 @@ class Part:
         run, known, verdict = judged_log(messages)
         names = ("gated", "matched", "innovation_d2", "innovation_rows")
         sums = {name: float(run.frames[name].sum()) for name in names}
-        faults, grave = _names(known)
+        faults = [fault.name for fault in known.faults]
+        grave = [fault.name for fault in known.faults if fault.grave]
         good = round(run.good_share * run.health.frames)
-        return cls(verdict, faults, grave, _light(found), run.health.frames, good, sums)
-
-
-def _light(found: Explanation) -> Explanation:
-    """Returns the explanation without the messages that it came from."""
-    return Explanation(
-        found.origin_ns, found.end_ns, found.episodes, found.setup, found.health, found.remarks,
-        found.unexplained,
-    )  # fmt: skip
-
-
-def _names(known: Known) -> tuple[list[str], list[str]]:
-    return [f.name for f in known.faults], [f.name for f in known.faults if f.grave]
+        return cls(
+            verdict, faults, grave, replace(found, messages=()), run.health.frames, good, sums
+        )
 
 
 @dataclass

@@ -41,7 +41,6 @@ from pelorus.wire.frames import (
     Twist,
 )
 from pelorus.wire.framing import DELIMITER, Counts, Reader, Writer, encode, end_of
-from pelorus.wire.layout import Floats
 from pelorus.wire.schema import HEALTHS, REASONS, STATUSES
 from pelorus.wire.settings import IDS
 
@@ -413,38 +412,27 @@ def start_from(pose: Pose, inertial: bool = False) -> Start:
 # --- a kept state ---------------------------------------------------------------------------------
 
 
-Data = Twist | Imu | Reading | Truth | Stereo
-
-
 def restored(messages: list[Message], moved: tuple[float, float] = (0.0, 0.0)) -> list[Message]:
     """Returns the drive with a restore right before its data, instead of its START.
 
     `moved` is how far the robot may have moved since it was saved: sigmas in m and rad.
     """
-    first = _data_indices(messages)[0]
+    first, t_ns = _data(messages)[0]
     setup = [message for message in messages[:first] if message.kind != Kind.START]
-    state = State(_time(messages[first]), StateAction.RESTORE, _variances(moved))
+    state = State(t_ns, StateAction.RESTORE, np.repeat(np.square(moved), 3))
     return [*setup, state, *messages[first:]]
 
 
 def saved(messages: list[Message]) -> list[Message]:
     """Returns the drive with a save after its data."""
-    last = _data_indices(messages)[-1]
-    state = State(_time(messages[last]), StateAction.SAVE)
-    return [*messages[: last + 1], state, *messages[last + 1 :]]
+    last, t_ns = _data(messages)[-1]
+    return [*messages[: last + 1], State(t_ns, StateAction.SAVE), *messages[last + 1 :]]
 
 
-def _data_indices(messages: list[Message]) -> list[int]:
-    indices = [at for at, message in enumerate(messages) if isinstance(message, Data)]
-    if not indices:
+def _data(messages: list[Message]) -> list[tuple[int, int]]:
+    """Returns the indices of the data, and their times."""
+    data = Twist | Imu | Reading | Truth | Stereo
+    found = [(at, message.t_ns) for at, message in enumerate(messages) if isinstance(message, data)]
+    if not found:
         raise PelorusError("the recording holds no data, so there is no state to save or restore")
-    return indices
-
-
-def _time(message: Message) -> int:
-    assert isinstance(message, Data)
-    return message.t_ns
-
-
-def _variances(moved: tuple[float, float]) -> Floats:
-    return np.repeat(np.square(moved), 3)
+    return found

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pelorus.io.recording import Recording
 from pelorus.io.small_sensors import SMALL_SENSORS, Motion, SmallSensor
@@ -346,59 +345,31 @@ def _observe(
         options.keep_ids or options.known,
         chances["tracker"],
     )
-    eye = _Eye(options, t_ns, poses, points, chances)
+    mishaps = options.mishaps
+    camera, extrinsic = mishaps.true_camera(options.camera), mishaps.true_extrinsic(sensors.T_CB)
+    moves = (chances["moving"].random(len(points)) < mishaps.moving)[:, None]
+    ways = mishaps.ways(t_ns, poses, chances["moving_ways"])
+    drift = TrackDrift(len(points), mishaps.track_drift, chances["drift"])
+    tau_s = np.diff(t_ns, prepend=t_ns[:1]) * 1e-9
+    by_chance = (options.pixel_sigma_px, options.outliers, chances["pixels"], chances["outliers"])
     frames, ids, pixels, wrong = [], [], [], []
     for k in progress(range(len(t_ns)), "simulating", len(t_ns)):
-        seen = eye.look(k)
+        places = np.where(moves, points + ways[k], points)
+        R, p = poses.at(k)
+        seen = sensors.view(R, p, places, options.seen_m, camera, options.depths, extrinsic)
         landmarks = tracker.follow(seen.visible)
         id = tracker.ids(landmarks)
-        measured, bad = sensors.measure(
-            seen,
-            landmarks,
-            options.pixel_sigma_px,
-            options.outliers,
-            chances["pixels"],
-            chances["outliers"],
-        )
+        measured, bad = sensors.measure(seen, landmarks, *by_chance)
         frames.append(np.full(len(landmarks), k, np.intp))
         ids.append(id)
-        pixels.append(measured + eye.drift(k, landmarks, id))
+        pixels.append(measured + drift.wander(landmarks, id, float(tau_s[k])))
         wrong.append(bad)
     id = np.concatenate(ids)
     frame = np.concatenate(frames)
     order = np.lexsort((id, frame))
     tracks = Tracks.from_rows(len(poses.p), frame, id, np.concatenate(pixels))
-    tracks, whose = options.mishaps.freeze(t_ns, tracks)
+    tracks, whose = mishaps.freeze(t_ns, tracks)
     return tracks, np.concatenate(wrong)[order][whose]
-
-
-class _Eye:
-    """The true camera, and the landmarks' places over time."""
-
-    def __init__(
-        self, options: Options, t_ns: Times, poses: Poses, points: Floats, chances: Chances
-    ) -> None:
-        mishaps = options.mishaps
-        self._options = options
-        self._camera = mishaps.true_camera(options.camera)
-        self._extrinsic = mishaps.true_extrinsic(sensors.T_CB)
-        self._poses = poses
-        self._points = points
-        moves = chances["moving"].random(len(points)) < mishaps.moving
-        self._moves = moves[:, None]
-        self._ways = mishaps.ways(t_ns, poses, chances["moving_ways"])
-        self._drift = TrackDrift(len(points), mishaps.track_drift, chances["drift"])
-        self._tau_s = np.diff(t_ns, prepend=t_ns[:1]) * 1e-9
-
-    def look(self, k: int) -> sensors.View:
-        options = self._options
-        points = np.where(self._moves, self._points + self._ways[k], self._points)
-        R, p = self._poses.at(k)
-        seen = (options.seen_m, self._camera, options.depths, self._extrinsic)
-        return sensors.view(R, p, points, *seen)
-
-    def drift(self, k: int, landmarks: Indices, ids: NDArray[np.int64]) -> Floats:
-        return self._drift.wander(landmarks, ids, float(self._tau_s[k]))
 
 
 def _header(options: Options) -> Header:
