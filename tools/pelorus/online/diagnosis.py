@@ -11,7 +11,7 @@ import numpy as np
 
 from pelorus.evaluate.health import DEGRADED, GOOD, HARMLESS, SHORT
 from pelorus.online.odometry import Odom, Odometry
-from pelorus.online.pairs import Pairing, Together
+from pelorus.online.order import Pairing, Together
 from pelorus.wire import schema
 
 MISSED_SHARE = 0.1  # of the pictures may lack their partner before it is told

@@ -23,8 +23,7 @@ from pelorus.math import se3
 from pelorus.math.inertial import Inertial
 from pelorus.math.se3 import Poses
 from pelorus.online.odometry import Odom, Odometry
-from pelorus.online.order import Datum
-from pelorus.online.pairs import Joining, Pairing, Together
+from pelorus.online.order import Datum, Joining, Pairing, Together
 from pelorus.rig.read import Calibrated
 from pelorus.tracking.images import Gray
 from pelorus.wire import schema

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus.evaluate.evaluation import Accuracy
-from pelorus.evaluate.relative_error import Drift, drifts
+from pelorus.evaluate.evaluation import Accuracy, Drift, drifts
 from pelorus.explain.explanation import Explanation
 from pelorus.report.curves import BESIDE
 from pelorus.report.page import PageTable
