@@ -35,9 +35,7 @@ STARTS = ("truth", "identity", "recorded")
 app = typer.Typer()
 
 
-@app.command(
-    epilog="Example:  pelorus compare flight.plr",
-)
+@app.command(epilog="Example:  pelorus compare flight.plr")
 def compare(
     log: Path = typer.Argument(
         ...,

@@ -33,7 +33,7 @@ app = typer.Typer()
 
 @app.command(
     epilog="Example:  pelorus fleet logs --out fleet.parquet "
-    '--ask "select cause, count(*) from fleet group by cause"',
+    '--ask "select cause, count(*) from fleet group by cause"'
 )
 def fleet(
     source: Path = typer.Argument(

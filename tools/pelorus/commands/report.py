@@ -47,7 +47,7 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example:  pelorus report drive.plr --out out --config robot.conf --set bias=on",
+    epilog="Example:  pelorus report drive.plr --out out --config robot.conf --set bias=on"
 )
 def report(
     recording: Path = typer.Argument(..., metavar="IN.plr", help="The recording to replay."),

@@ -63,10 +63,7 @@ ADVICE = {
     "REFUSED_INPUT": "tracks are malformed, or an id stands twice in a frame",
 }
 NOTHING_YET = Status(
-    "estimate",
-    Level.ERROR,
-    "nothing is estimated yet",
-    "camera and IMU (or wheels) must both send",
+    "estimate", Level.ERROR, "nothing is estimated yet", "camera and IMU (or wheels) must both send"
 )
 LEVELS = {GOOD: Level.OK, DEGRADED: Level.WARN}
 

@@ -63,10 +63,7 @@ def write_page(
 
 
 def of_explanation(
-    found: Explanation,
-    title: str,
-    tables: Sequence[PageTable] = (),
-    facts: str = "",
+    found: Explanation, title: str, tables: Sequence[PageTable] = (), facts: str = ""
 ) -> Answer:
     """Returns the answer to an explanation of a log."""
     verdict = found.verdict

@@ -25,14 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.evaluate.evaluation import (
-    Accuracy,
-    accuracy_of,
-    judge,
-    known_in,
-    made_in,
-    sigmas_m,
-)
+from pelorus.evaluate.evaluation import Accuracy, accuracy_of, judge, known_in, made_in, sigmas_m
 from pelorus.evaluate.frame_table import FrameTable, frame_table
 from pelorus.evaluate.health import TimeLine, time_line
 from pelorus.grid.occupancy import Grid, Wish, occupancy

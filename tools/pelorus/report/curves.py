@@ -393,11 +393,7 @@ class Curves:
         }
 
     def _track(
-        self,
-        name: str,
-        t_ns: Times,
-        p: Floats,
-        seconds: Callable[[Times], Floats] | None = None,
+        self, name: str, t_ns: Times, p: Floats, seconds: Callable[[Times], Floats] | None = None
     ) -> dict[str, Any]:
         some = slice(None, None, -(-len(p) // FRAMES_MOST))
         since = (seconds or self._seconds)(t_ns)[some]

@@ -44,11 +44,7 @@ class Landmarks:
     """The landmarks that the filter left behind, and the history of each id in the log."""
 
     def __init__(
-        self,
-        messages: Sequence[Message],
-        origin_ns: int,
-        way: Trajectory | None,
-        packer: Packer,
+        self, messages: Sequence[Message], origin_ns: int, way: Trajectory | None, packer: Packer
     ) -> None:
         self._messages = messages
         self._origin_ns = origin_ns

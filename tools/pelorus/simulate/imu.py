@@ -15,15 +15,7 @@ from pelorus.math.inertial import GRAVITY_MPS2, Inertial
 from pelorus.math.motion import Times
 from pelorus.simulate import drive, sensors, settings
 from pelorus.simulate.drive import Drive, wave
-from pelorus.simulate.settings import (
-    BELOW_ONE,
-    FINITE,
-    POSITIVE,
-    Rule,
-    Span,
-    require,
-    setting,
-)
+from pelorus.simulate.settings import BELOW_ONE, FINITE, POSITIVE, Rule, Span, require, setting
 from pelorus.wire.frames import IMU_READINGS_MAX, Noise, Process, Start, StartFlag
 from pelorus.wire.layout import Floats, pack_symmetric
 

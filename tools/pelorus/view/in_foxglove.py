@@ -288,12 +288,7 @@ def _plot(title: str, curves: tuple[tuple[str, str], ...]) -> dict[str, Any]:
 
 
 def _split(direction: str, first: Any, second: Any, percent: int = 50) -> dict[str, Any]:
-    return {
-        "direction": direction,
-        "first": first,
-        "second": second,
-        "splitPercentage": percent,
-    }
+    return {"direction": direction, "first": first, "second": second, "splitPercentage": percent}
 
 
 def _stacked(names: list[str]) -> Any:
