@@ -22,7 +22,7 @@ from pelorus.grid.plane import AXES, choose
 from pelorus.io.trajectory import POSE_SIZE, Trajectory, estimate_in
 from pelorus.math.ellipsoids import ellipsoids
 from pelorus.math.motion import Times, nearest
-from pelorus.report.landmarks import WHY, Landmarks, packed
+from pelorus.report.landmarks import WHY, landmarks_json, packed
 from pelorus.report.packed import Packer
 from pelorus.wire import schema
 from pelorus.wire.evidence import Evidence
@@ -110,9 +110,13 @@ class Curves:
             "words": _words(),
             "charts": [self._packed(chart) for chart in self._charts()],
             "map": self._map(),
-            "landmarks": Landmarks(
-                self.messages, self.origin_ns, self._found and self._found[0], self.packer
-            ).json(self.left_out),
+            "landmarks": landmarks_json(
+                self.messages,
+                self.origin_ns,
+                self._found and self._found[0],
+                self.packer,
+                self.left_out,
+            ),
         }
 
     def _health_beside(self) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def drive(
     The reading at t_j depends on `timing`; the poses are the integral of the readings, so truth and
     twists agree up to rounding.
     """
-    v, w = profile(t_ns, speed_mps, lap_s)
+    v, w = profile_at(np.asarray(t_ns * 1e-9, np.float64), speed_mps, lap_s)
     if stop is not None:
         rests = stop.holds(t_ns)[:, None]
         v, w = np.where(rests, 0.0, v), np.where(rests, 0.0, w)
@@ -62,13 +62,8 @@ def stood(t_ns: Times) -> Drive:
     return Drive(t_ns, still, still, Poses(R, np.broadcast_to(FIRST.p, still.shape)))
 
 
-def profile(t_ns: Times, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
-    """Returns linear and angular velocity (n, 3) in a forward-left-up body."""
-    return profile_at(np.asarray(t_ns * 1e-9, np.float64), speed_mps, lap_s)
-
-
 def profile_at(t: Floats, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
-    """Returns the same at times in seconds."""
+    """Returns linear and angular velocity (n, 3) in a forward-left-up body at times in seconds."""
     lap_rate = 6.283185307179586 / lap_s
     v = np.stack(
         (
