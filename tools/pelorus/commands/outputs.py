@@ -20,7 +20,6 @@ from typer.models import ParameterInfo
 
 from pelorus.errors import STANDARD_OUTPUT, Existing, places
 from pelorus.program.console import leave_standard_output, out
-from pelorus.wire.frames import TEXT_BYTES_MAX, Text
 
 if TYPE_CHECKING:
     from pelorus.check.verdict import Verdict
@@ -115,6 +114,8 @@ def _finding_verdict(finding: Finding) -> str:
 
 def write(recording: Recording, findings: list[Finding], target: Path) -> None:
     """Prints the findings, keeps them in the recording as TEXT, and writes the file."""
+    from pelorus.wire.frames import TEXT_BYTES_MAX, Text  # noqa: PLC0415 - numpy loads slowly
+
     for finding in findings:
         out.print(f"{finding.subject}: {_finding_verdict(finding)}: {escape(finding.evidence)}")
         out.print(f"    -> {escape(finding.action)}")
