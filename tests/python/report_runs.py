@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from pelorus.errors import PelorusError
 from pelorus.native.replay import Programs, find_programs
-from pelorus.report.comparison import Comparison
-from pelorus.report.results import carry_out, plan_runs, read_subject
+from pelorus.report.comparison import Comparison, carry_out, plan_runs, read_subject
 from pelorus.wire.frames import Message
 from replay_drive import BIN, encode
 

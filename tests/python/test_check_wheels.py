@@ -15,7 +15,7 @@ import pytest
 from converted import Run
 from pelorus.check.contents import recording_of
 from pelorus.explain import explain
-from pelorus.explain.incident import Cause
+from pelorus.explain.log import Cause
 from pelorus.faults.fault import Fault
 from pelorus.faults.named import judged_of
 from pelorus.io.recording import Recording

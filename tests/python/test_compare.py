@@ -28,7 +28,7 @@ from flight_logs import (
 )
 from pelorus import ARITHMETIC, __version__
 from pelorus.flight.judge import fingerprint
-from pelorus.robot.status import condition
+from pelorus.robot.stream import condition
 from pelorus.wire.frames import NO_BUDGET, Config, Kind, Message, Pose, Report, Stereo, Text, Twist
 from pelorus.wire.schema import HEALTHS, REASONS, STATUSES
 from replay_drive import BIN, FRAMES, drive, encode, header, known

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
-from pelorus.online.expected import ExpectedMotion, Velocity, known_velocity
+from pelorus.online.pipeline import ExpectedMotion, Velocity, known_velocity
 
 MS = 1_000_000
 W, V = np.array([0.3, -0.5, 0.2]), np.array([1.0, -0.4, 0.3])

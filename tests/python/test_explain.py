@@ -23,8 +23,8 @@ from pelorus.check import verdict as verdicts
 from pelorus.errors import PelorusError
 from pelorus.explain import Explanation, explain
 from pelorus.explain.explanation import LINES
-from pelorus.explain.incident import Cause
-from pelorus.explain.log import runs
+from pelorus.explain.log import Cause
+from pelorus.math.motion import runs
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.simulate.imu import SimulatedImu

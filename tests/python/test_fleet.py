@@ -20,11 +20,9 @@ from pelorus.errors import PelorusError
 from pelorus.evaluate import evaluation
 from pelorus.fleet import cluster, table
 from pelorus.fleet.examine import Work, digest_of_tools, examine
-from pelorus.fleet.journal import Journal
-from pelorus.fleet.page import write_page
-from pelorus.fleet.pieces import in_pieces
-from pelorus.fleet.ranking import rank
-from pelorus.fleet.row import BROKEN, Found, Row
+from pelorus.fleet.page import rank, write_page
+from pelorus.fleet.table import BROKEN, Found, Journal, Row
+from pelorus.fleet.whole import in_pieces
 from pelorus.native.replay import result_of
 from pelorus.program.console import spoken_time
 from pelorus.wire.frames import Stereo

@@ -293,7 +293,7 @@ OWN = (
     *("check/contents.py", "errors.py", "wire/framing.py"),
     *("wire/packed_file.py", "report/page.py", "native/replay.py", "wire/schema.py"),
     *("robot/emulator.py", "robot/serial.py"),
-    *("fleet/examine.py", "fleet/journal.py"),
+    *("fleet/examine.py", "fleet/table.py"),
 )
 
 

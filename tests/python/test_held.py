@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from pelorus.check import biases, outcome, shared_rows, tuning, verdict
+from pelorus.check import biases, halves_alike, outcome, tuning, verdict
 from pelorus.check.held import held_against
 from pelorus.check.outcome import NOTHING, Outcome
 from pelorus.check.parameters import Tuned, larger
@@ -141,10 +141,10 @@ def test_a_sigma_that_is_about_what_the_rows_leave_stays(monkeypatch: pytest.Mon
     bench = SimpleNamespace(run=lambda _: less_sure)
     for given, written in (("2", "2"), ("1", "2.3")):
         tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, DRIFTS)
-        kept = shared_rows.with_shared_rows(cast(Any, bench), tuned)
+        kept = halves_alike.with_shared_rows(cast(Any, bench), tuned)
         assert kept.settings["pixel-sigma"] == written
         surer = replace(tuned, after=replace(NOTHING, pose_log_det=1.0))  # as it was
-        assert shared_rows.with_shared_rows(cast(Any, bench), surer) is surer
+        assert halves_alike.with_shared_rows(cast(Any, bench), surer) is surer
 
 
 def test_all_noises_are_made_larger_alike() -> None:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run
-from pelorus.evaluate import evaluation, inertial_evaluation
+from pelorus.evaluate import evaluation
 from pelorus.evaluate.evaluation import judge
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
-from pelorus.simulate.scene import CAMERA
+from pelorus.simulate.sensors import CAMERA
 from pelorus.wire.frames import Config, Header, Message, Pose, Stereo, Truth, TruthKnows
 from pelorus.wire.layout import Floats, pack_symmetric
 from pelorus.wire.settings import IDS
@@ -142,7 +142,7 @@ def test_what_truth_does_not_tell_is_left_open() -> None:
     assert found["nees_bias_gyro"] is None
     assert found["nees_position"] == pytest.approx(0.0, abs=1e-12)
     twists = judge(messages[1:])
-    assert not set(inertial_evaluation.MEANING) & set(twists), "of an IMU alone"
+    assert not set(evaluation.INERTIAL_MEANING) & set(twists), "of an IMU alone"
     assert set(found) <= set(evaluation.MEANING)
 
 

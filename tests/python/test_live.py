@@ -18,10 +18,8 @@ from pelorus.commands.cli import main
 from pelorus.errors import PelorusError
 from pelorus.io.recording import Recording
 from pelorus.live.camera import Measured, Picture
-from pelorus.live.intake import Intake
-from pelorus.live.line import HealthLine, News
-from pelorus.live.outputs import as_object
-from pelorus.live.session import CAMERA_FROM_FLU, HERE, How, Session, on_camera
+from pelorus.live.outputs import HealthLine, News, as_object
+from pelorus.live.session import CAMERA_FROM_FLU, HERE, How, Intake, Session, on_camera
 from pelorus.math import se3
 from pelorus.math.se3 import Poses
 from pelorus.online.diagnosis import Level, Status

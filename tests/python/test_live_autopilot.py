@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from pelorus.errors import PelorusError
 from pelorus.live import port
-from pelorus.live.autopilot import COMPONENT, Autopilot, Origin
-from pelorus.live.frd import fields
+from pelorus.live.autopilot import COMPONENT, Autopilot, Origin, fields
 from pelorus.live.port import Port, Udp
 from pelorus.math import se3
 from pelorus.math.se3 import IDENTITY, Poses

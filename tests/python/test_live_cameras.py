@@ -17,8 +17,7 @@ from live_cameras import Oak, RealSense
 from pelorus.commands.cli import main
 from pelorus.errors import PelorusError
 from pelorus.live import oak, realsense, v4l2
-from pelorus.live.camera import Asked, Force, Picture, Rate, open_camera
-from pelorus.live.clock import OtherClock
+from pelorus.live.camera import Asked, Force, OtherClock, Picture, Rate, open_camera
 from pelorus.math.se3 import Poses
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.wire.frames import Imu

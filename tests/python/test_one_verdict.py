@@ -19,7 +19,7 @@ from pelorus.check.known import Known
 from pelorus.check.verdict import Grade
 from pelorus.evaluate.health import SHORT, time_line
 from pelorus.explain import explain
-from pelorus.explain.incident import Cause
+from pelorus.explain.log import Cause
 from pelorus.native.replay import replayed
 from pelorus.report.curves import Curves
 from pelorus.simulate.imu import SimulatedImu

@@ -13,8 +13,7 @@ from pelorus.math import se3
 from pelorus.math.se3 import Poses
 from pelorus.online.drive import Setup
 from pelorus.online.odometry import Given, Odom, Odometry
-from pelorus.online.order import ClockStep, Datum, Sequencer
-from pelorus.online.pairs import Joining, Pairing
+from pelorus.online.order import ClockStep, Datum, Joining, Pairing, Sequencer
 from pelorus.simulate.imu import SimulatedImu
 from pelorus.simulate.simulate import Options, simulate
 from pelorus.wire.frames import Config, Imu, Pose, Start, Stereo, Twist

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pelorus.evaluate.evaluation import Accuracy, assess
-from pelorus.evaluate.relative_error import drifts
+from pelorus.evaluate.evaluation import Accuracy, assess, drifts
 from pelorus.io.trajectory import Trajectory
 from pelorus.math.se3 import Poses
 from scipy.spatial.transform import Rotation

@@ -23,8 +23,7 @@ from pelorus.math import se3
 from pelorus.math.consistency import nees_per_dof
 from pelorus.native.replay import Outputs, Programs
 from pelorus.report import words
-from pelorus.report.comparison import Comparison
-from pelorus.report.results import read_map
+from pelorus.report.comparison import Comparison, read_map
 from pelorus.wire.frames import Kind, Landmark, Pose, Report, Role, Stereo, Truth
 from pelorus.wire.layout import pack_symmetric, unpack_symmetric
 from PIL import Image

@@ -14,7 +14,7 @@ from pelorus.grid import plane
 from pelorus.math.se3 import Poses
 from pelorus.native.replay import Programs
 from pelorus.program import style
-from pelorus.report import pictures, top_view
+from pelorus.report import pictures
 from pelorus.report.curves import Curves
 from pelorus.wire.frames import BodyAxes
 from replay_drive import drive, known
@@ -62,10 +62,10 @@ def test_other_bodies_are_shown_in_the_plane_of_largest_extent() -> None:
 
 def test_a_run_that_strays_does_not_blow_up_the_picture(tmp_path: Path, programs: Programs) -> None:
     found = compared(recorded(tmp_path, drive()), programs)
-    calm = top_view.view(found)
+    calm = pictures.view(found)
     course = found.run("course")
     course.trajectory.poses.p[-1] += 1e6
-    wild = top_view.view(found)
+    wild = pictures.view(found)
     assert wild.box.side < 3 * calm.box.side
     for path in (wild.paths["yours"], wild.truth):
         assert path is not None
@@ -74,7 +74,7 @@ def test_a_run_that_strays_does_not_blow_up_the_picture(tmp_path: Path, programs
 
 
 def test_a_shaped_box_holds_the_old_one_and_has_the_shape() -> None:
-    box = top_view.Box(np.array([1.0, 2.0]), np.array([4.0, 3.0]))
+    box = pictures.Box(np.array([1.0, 2.0]), np.array([4.0, 3.0]))
     for ratio in (0.2, 1.0, 3.0, 7.0):
         shaped = box.shaped(ratio)
         width, height = shaped.high - shaped.low
@@ -84,15 +84,15 @@ def test_a_shaped_box_holds_the_old_one_and_has_the_shape() -> None:
 
 
 def test_equal_metres_are_equal_pixels(tmp_path: Path, programs: Programs) -> None:
-    figure = top_view.draw(compared(recorded(tmp_path, drive() + known()), programs))
+    figure = pictures.top_view(compared(recorded(tmp_path, drive() + known()), programs))
     axes = figure.axes[0]
     figure.draw_without_rendering()
     origin, there = axes.transData.transform([[0, 0], [1, 1]])
     across, up = there - origin
     assert across == pytest.approx(up)
     width, height = axes.get_position().size * figure.get_size_inches()
-    assert width == pytest.approx(top_view.PANEL_IN)  # the equal aspect has not shrunk the panel
-    assert height >= top_view.PANEL_HEIGHT_IN[0] - 1e-9
+    assert width == pytest.approx(pictures.PANEL_IN)  # the equal aspect has not shrunk the panel
+    assert height >= pictures.PANEL_HEIGHT_IN[0] - 1e-9
 
 
 def test_every_picture_has_labelled_axes(tmp_path: Path, programs: Programs) -> None:

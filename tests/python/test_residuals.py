@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from pelorus.explain.log import FilterLog, log_of
 from pelorus.native.replay import replayed
-from pelorus.report.drawings import plot
 from pelorus.report.residuals import Residuals, residuals, residuals_of
-from pelorus.report.spectra import drawings
+from pelorus.report.spectra import drawings, plot
 from pelorus.simulate.imu import SimulatedImu
 from pelorus.simulate.settings import Span
 from pelorus.simulate.simulate import Options, simulate

@@ -14,7 +14,7 @@ from drives import PERFECT
 from pelorus.errors import PelorusError
 from pelorus.io.tracks import project
 from pelorus.math import motion, se3
-from pelorus.simulate import drive, scene
+from pelorus.simulate import drive, sensors
 from pelorus.simulate.imu import SimulatedImu
 from pelorus.simulate.simulate import Options, Simulation, simulate
 from pelorus.wire import framing
@@ -28,7 +28,7 @@ def exact_pixels(simulation: Simulation) -> Floats:
     recording = simulation.recording
     tracks = recording.tracks
     at = np.searchsorted(recording.truth_t_ns, recording.frame_t_ns)[tracks.frame]
-    T_CW = se3.compose(scene.T_CB, se3.inverse(recording.truth.at(at)))
+    T_CW = se3.compose(sensors.T_CB, se3.inverse(recording.truth.at(at)))
     q = se3.apply(T_CW, simulation.points_W[tracks.id])
     return project(recording.header.camera, q)
 
@@ -74,7 +74,7 @@ def test_perfect_pixels_are_the_projection_of_the_landmarks_within_the_image() -
     assert (v < 480).all()
     assert (pixels[:, 0] > pixels[:, 2]).all()
     depth = 420 * 0.2 / (pixels[:, 0] - pixels[:, 2])
-    assert depth.min() > scene.DEPTH_MIN_M
+    assert depth.min() > sensors.DEPTH_MIN_M
     assert depth.max() < 30.0
 
 
@@ -192,7 +192,7 @@ def test_the_header_tells_the_noise_that_there_is(tmp_path: Path, pelorus: Run) 
     assert header.noise.pixel_sigma_px == 0.3
     assert header.noise.gyro_sigma_radps < 0, "no noise is no suggestion"
     assert header.twist_timing is TwistTiming.MID
-    assert (header.image_width_px, header.image_height_px) == scene.IMAGE_PX
+    assert (header.image_width_px, header.image_height_px) == sensors.IMAGE_PX
 
 
 def test_frames_of_a_slow_camera_stand_later_in_the_file(tmp_path: Path, pelorus: Run) -> None:

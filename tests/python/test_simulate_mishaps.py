@@ -15,7 +15,7 @@ from pelorus.errors import PelorusError
 from pelorus.io.recording import Recording
 from pelorus.io.tracks import triangulate
 from pelorus.math import se3
-from pelorus.simulate import scene
+from pelorus.simulate import sensors
 from pelorus.simulate.mishaps import Mishaps
 from pelorus.simulate.settings import Span
 from pelorus.simulate.simulate import Options, simulate
@@ -35,7 +35,7 @@ def seen_in_world(recording: Recording) -> Floats:
     """(n, 3): where each observation puts its point, by the told camera and the true pose."""
     tracks = recording.tracks
     at = np.searchsorted(recording.truth_t_ns, recording.frame_t_ns)[tracks.frame]
-    T_WC = se3.compose(recording.truth.at(at), se3.inverse(scene.T_CB))
+    T_WC = se3.compose(recording.truth.at(at), se3.inverse(sensors.T_CB))
     return se3.apply(T_WC, triangulate(recording.header.camera, tracks.pixels))
 
 

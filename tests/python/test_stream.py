@@ -21,11 +21,9 @@ from converted import Run
 from fake_board import FULL, FakeBoard, Manner, Served, TcpBoard, TerminalBoard
 from pelorus.errors import PelorusError
 from pelorus.robot import link
-from pelorus.robot.flight_log import FlightLog
 from pelorus.robot.link import Link, LinkClosed
 from pelorus.robot.serial import open_serial
-from pelorus.robot.status import refusal
-from pelorus.robot.stream import Streamer
+from pelorus.robot.stream import FlightLog, Streamer, refusal
 from pelorus.wire import framing
 from pelorus.wire.frames import (
     Config,

@@ -14,7 +14,7 @@ from converted import Run
 from fake_board import FakeBoard, TcpBoard
 from pelorus.errors import PelorusError
 from pelorus.robot import stream
-from pelorus.robot.state import restored, saved
+from pelorus.robot.stream import restored, saved
 from pelorus.wire.frames import Config, Kind, Message, Report, Start, State, StateAction, Text
 from pelorus.wire.schema import STATUSES
 from replay_drive import FRAMES, drive, encode, known, log_of, t_ns

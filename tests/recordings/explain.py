@@ -25,7 +25,7 @@ from injected_events import EVENTS, Event, Messages, S, moving
 from judge import DATA, cases, converted, parser_of, run
 from pelorus.evaluate.health import GOOD
 from pelorus.explain import Explanation, explain
-from pelorus.explain.incident import Cause, Incident
+from pelorus.explain.log import Cause, Incident
 from pelorus.simulate.imu import SimulatedImu
 from pelorus.simulate.simulate import Options, simulate
 from pelorus.wire import schema

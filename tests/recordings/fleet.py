@@ -26,8 +26,7 @@ from pathlib import Path
 from pelorus.commands.cli import main as pelorus
 from pelorus.fleet import cluster, table
 from pelorus.fleet.examine import Work, digest_of_tools, examine
-from pelorus.fleet.journal import Journal
-from pelorus.fleet.row import Found, Row
+from pelorus.fleet.table import Found, Journal, Row
 
 # A minute each, and judged in a second; and one of ten hours, which is read in pieces.
 FEW_POINTS = ("--observations", "15", "--landmarks", "400")

@@ -12,8 +12,7 @@ from desk import digest
 from pelorus.errors import PelorusError
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
-from pelorus.robot.state import restored, saved
-from pelorus.robot.stream import Streamer, StreamResult
+from pelorus.robot.stream import Streamer, StreamResult, restored, saved
 from pelorus.wire.frames import Header, Kind, Message, Pose, Start, State, StateAction, Stereo
 from recordings import first_frames
 

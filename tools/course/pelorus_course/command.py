@@ -15,7 +15,7 @@ from pelorus.io.trajectory import read_truth
 from pelorus.native.replay import find_programs
 from pelorus.program.console import err, out
 from pelorus.program.extras import figures_missing
-from pelorus.report.results import Subject, read_subject
+from pelorus.report.comparison import Subject, read_subject
 from pelorus.wire.packed_file import bare_name
 from rich.markup import escape
 from rich.table import Table

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing, TimingOrAuto
-from pelorus.commands.conversion import write
+from pelorus.commands.outputs import write
 from pelorus.faults.mend import findings_of
 
 from pelorus_course import ece276a as ece276a_converter

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pelorus.program.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
-from pelorus.report.results import OWN
-from pelorus.report.top_view import Box, around
+from pelorus.report.comparison import OWN
+from pelorus.report.pictures import Box, around
 from pelorus.wire.layout import Floats
 
 from pelorus_course.trial import NAMES, Trial

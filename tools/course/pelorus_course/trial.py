@@ -17,8 +17,16 @@ from pelorus.grid.sightings import sightings
 from pelorus.math.se3 import apply
 from pelorus.native.replay import Programs
 from pelorus.program.console import progress
-from pelorus.report.comparison import COURSE, Comparison, Traces
-from pelorus.report.results import OWN, Run, Subject, carry_out, plan_runs
+from pelorus.report.comparison import (
+    COURSE,
+    OWN,
+    Comparison,
+    Run,
+    Subject,
+    Traces,
+    carry_out,
+    plan_runs,
+)
 from pelorus.wire.layout import Floats
 
 NAMES = {

@@ -14,13 +14,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from pelorus.check.calibration import (
-    CAMERA_TURN,
-    CalibrationDoubts,
-    Doubt,
-    Turned,
-    calibration,
-)
+from pelorus.check.calibration import CAMERA_TURN, CalibrationDoubts, Doubt, Turned, calibration
 from pelorus.check.covering import covering, noises_are_usual, not_covered
 from pelorus.check.estimated import Estimated, estimated
 from pelorus.check.known import Known, known_of

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, settings_given
-from pelorus.commands.verdicts import VERDICT_COLOURS
+from pelorus.commands.outputs import VERDICT_COLOURS
 from pelorus.errors import write_text
 from pelorus.native.replay import find_programs
 from pelorus.program.console import out, print_json, steps
@@ -88,7 +88,6 @@ def _write(
     from pelorus.native.replay import Outputs, replay  # noqa: PLC0415
     from pelorus.report import answers  # noqa: PLC0415
     from pelorus.report.curves import Curves  # noqa: PLC0415
-    from pelorus.report.footage import footage  # noqa: PLC0415
     from pelorus.report.page import write  # noqa: PLC0415
     from pelorus.wire import framing  # noqa: PLC0415
 
@@ -100,10 +99,7 @@ def _write(
     messages = framing.messages_of(outputs.log)
     explained = explain(messages)
     answer = answers.of_check(found, recording.name, explained)
-    answer = answers.with_setup(answer, messages)
-    if pictures is not None:
-        answer = answers.with_footage(answer, footage(messages, explained, pictures, calibration))
-    write(page, answer, Curves(messages))
+    answers.write_page(page, answer, Curves(messages), explained, pictures, calibration)
 
 
 def _tell(found: Checked, tuned: Path) -> None:

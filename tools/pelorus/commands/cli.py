@@ -16,22 +16,8 @@ from collections.abc import Sequence
 from io import TextIOWrapper
 
 COMMANDS = (
-    "try",
-    "convert",
-    "track",
-    "info",
-    "check",
-    "evaluate",
-    "explain",
-    "export",
-    "view",
-    "simulate",
-    "report",
-    "map",
-    "live",
-    "stream",
-    "compare",
-    "fleet",
+    *("try", "convert", "track", "info", "check", "evaluate", "explain", "export", "view"),
+    *("simulate", "report", "map", "live", "stream", "compare", "fleet"),
 )
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C

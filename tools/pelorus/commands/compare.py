@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import typer
@@ -24,8 +24,8 @@ from pelorus.flight.judge import (
 )
 from pelorus.flight.log import NOWHERE, Frame, read_log
 from pelorus.native.replay import find_programs
-from pelorus.program.console import err, out, print_json
-from pelorus.robot.status import condition
+from pelorus.program.console import err, out, print_json, tell_lines
+from pelorus.robot.stream import condition
 from pelorus.wire.frames import Config
 from pelorus.wire.schema import STATUSES
 
@@ -43,9 +43,7 @@ STARTS = ("truth", "identity", "recorded")
 app = typer.Typer()
 
 
-@app.command(
-    epilog="Example:  pelorus compare flight.plr",
-)
+@app.command(epilog="Example:  pelorus compare flight.plr")
 def compare(
     log: Path = typer.Argument(
         ...,
@@ -98,25 +96,15 @@ def compare_log(
     if as_json:
         print_json(comparison_json(log, judgements))
         return verdict_of(judgements)
-    for remark in log.remarks:
-        _line("log", remark)
+    tell_lines(("log", remark) for remark in log.remarks)
     for number, judgement in enumerate(judgements, 1):
         if len(judgements) > 1:
             out.print(f"[bold]part {number} of {len(judgements)}[/], {_span(judgement)}")
-        _tell(judgement, desk)
+        tell_lines(_told(judgement, desk))
     return _conclude(judgements)
 
 
 # --- what is told ---------------------------------------------------------------------------------
-
-
-def _line(name: str, words: str) -> None:
-    out.print(f"{name:<8}  {words}", markup=False)
-
-
-def _lines(lines: Iterable[tuple[str, str]]) -> None:
-    for name, words in lines:
-        _line(name, words)
 
 
 def _span(judgement: Judgement) -> str:
@@ -125,20 +113,20 @@ def _span(judgement: Judgement) -> str:
     return f"frames {frames[0].number} to {frames[-1].number}{began}"
 
 
-def _tell(judgement: Judgement, desk: Desk) -> None:
+def _told(judgement: Judgement, desk: Desk) -> Iterator[tuple[str, str]]:
     config = judgement.part.config
     if config is not None:
-        _line("robot", _build(config))
+        yield "robot", _build(config)
     if judgement.desk is not None and config is not None:
-        _line("desk", f"{_build(judgement.desk)}, {desk.program(config)}")
-    _lines(_counts(judgement))
+        yield "desk", f"{_build(judgement.desk)}, {desk.program(config)}"
+    yield from _counts(judgement)
     if judgement.first is not None:
-        _lines(_first(judgement.first))
-        _lines(_largest(judgement.differences))
+        yield from _first(judgement.first)
+        yield from _largest(judgement.differences)
     if judgement.why:
-        _line("but", judgement.why)
+        yield "but", judgement.why
     elif judgement.first is not None and config is not None:
-        _line("note", SAME_SOURCES if of_this_version(config) else OTHER_VERSION)
+        yield "note", SAME_SOURCES if of_this_version(config) else OTHER_VERSION
 
 
 def _build(build: Config) -> str:

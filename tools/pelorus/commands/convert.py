@@ -12,8 +12,8 @@ from rich.markup import escape
 
 from pelorus.commands import importers, own
 from pelorus.commands.choices import Fix, Timing
-from pelorus.commands.conversion import write
 from pelorus.commands.importers import OWN_DATA
+from pelorus.commands.outputs import write
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import imu_npz as imu_npz_converter
 from pelorus.converters import landmark_map, late_turns, readings_csv

@@ -44,9 +44,7 @@ MEANING = (
 app = typer.Typer()
 
 
-@app.command(
-    epilog="Example:  pelorus evaluate drive.plr --config robot.conf --set bias=on",
-)
+@app.command(epilog="Example:  pelorus evaluate drive.plr --config robot.conf --set bias=on")
 def evaluate(
     source: Path = typer.Argument(
         ...,

@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pelorus.commands.choices import CALIBRATION, LOG, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.commands.verdicts import tell_verdict
+from pelorus.commands.choices import (
+    CALIBRATION,
+    CONFIG,
+    LOG,
+    PICTURES,
+    PROGRAMS,
+    SETTINGS,
+    replay_options,
+)
+from pelorus.commands.outputs import tell_verdict
 from pelorus.native.replay import whole_log_of
 from pelorus.program.console import out, print_json, waiting
 
@@ -41,9 +49,7 @@ def explain(
         help="Of a recording: the same, or that of --beside, with another setting; repeatable.",
     ),
     as_json: bool = typer.Option(False, "--json", help="All of it as one JSON object."),
-    config: Path | None = typer.Option(
-        None, metavar="FILE", help="Settings for a recording, as pelorus-replay takes them."
-    ),
+    config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
 ) -> None:
@@ -91,8 +97,6 @@ def _write(
     from pelorus.report import answers  # noqa: PLC0415
     from pelorus.report.beside import NamedLog, drift_table, side_by_side  # noqa: PLC0415
     from pelorus.report.curves import Curves  # noqa: PLC0415
-    from pelorus.report.footage import footage  # noqa: PLC0415
-    from pelorus.report.page import write  # noqa: PLC0415
 
     facts = ""
     if other is None:
@@ -107,7 +111,4 @@ def _write(
         tables = [*side_by_side(first, second), *drift_table([first, second])]
         facts = f"Dashed curves are those of {other[0]}."
     answer = answers.of_explanation(found, name, tables, facts)
-    answer = answers.with_setup(answer, messages)
-    if pictures is not None:
-        answer = answers.with_footage(answer, footage(messages, found, pictures, calibration))
-    write(page, answer, curves)
+    answers.write_page(page, answer, curves, found, pictures, calibration)

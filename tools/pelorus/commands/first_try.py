@@ -9,7 +9,7 @@ from pathlib import Path
 
 import typer
 
-from pelorus.commands.another import run_command
+from pelorus.commands.outputs import run_command
 from pelorus.errors import Existing, PelorusError, made, resolved
 from pelorus.program.console import step, steps
 

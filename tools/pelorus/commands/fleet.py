@@ -11,17 +11,17 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.commands.choices import PROGRAMS, SETTINGS, settings_given
-from pelorus.commands.verdicts import VERDICT_COLOURS
+from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, settings_given
+from pelorus.commands.outputs import VERDICT_COLOURS
 from pelorus.errors import Existing, PelorusError
 from pelorus.fleet import table
-from pelorus.fleet.journal import Journal
+from pelorus.fleet.table import Journal
 from pelorus.program.console import err, out, print_json, tally, waiting
 
 if TYPE_CHECKING:
     from pelorus.fleet.examine import Work
-    from pelorus.fleet.ranking import Ranking
-    from pelorus.fleet.row import Found, Row
+    from pelorus.fleet.page import Ranking
+    from pelorus.fleet.table import Found, Row
 
 PATTERNS = ("*.plr", "*.plr.zst")
 TABLE = ".parquet"
@@ -33,7 +33,7 @@ app = typer.Typer()
 
 @app.command(
     epilog="Example:  pelorus fleet logs --out fleet.parquet "
-    '--ask "select cause, count(*) from fleet group by cause"',
+    '--ask "select cause, count(*) from fleet group by cause"'
 )
 def fleet(
     source: Path = typer.Argument(
@@ -71,9 +71,7 @@ def fleet(
     checked: bool = typer.Option(
         True, "--check/--no-check", help="Look for settings, too: a minute for one of driving."
     ),
-    config: Path | None = typer.Option(
-        None, metavar="FILE", help="Settings for the recordings, as pelorus-replay takes them."
-    ),
+    config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
     as_json: bool = typer.Option(False, "--json", help="The answer, or the ranking, as JSON."),
@@ -112,7 +110,7 @@ def fleet(
 
 
 def _recordings(folder: Path) -> list[Found]:
-    from pelorus.fleet.row import Found  # noqa: PLC0415 - with its caller
+    from pelorus.fleet.table import Found  # noqa: PLC0415 - with its caller
 
     if not folder.is_dir():
         raise PelorusError(f"{folder}: a folder of recordings is expected, or a {TABLE} table")
@@ -181,8 +179,7 @@ def _shown(
     folder: Path | None,
 ) -> Ranking:
     """Returns the ranking, and writes its page if one is wanted."""
-    from pelorus.fleet.page import write_page  # noqa: PLC0415 - loads slowly
-    from pelorus.fleet.ranking import rank  # noqa: PLC0415 - as above
+    from pelorus.fleet.page import rank, write_page  # noqa: PLC0415 - loads slowly
 
     ranking = rank(rows, before)
     if page is not None:

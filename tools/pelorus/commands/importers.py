@@ -14,7 +14,7 @@ from rich.markup import escape
 
 from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
-from pelorus.commands.conversion import write
+from pelorus.commands.outputs import write
 from pelorus.converters import csv, euroc, kitti, streams
 from pelorus.converters.columns import Columns
 from pelorus.converters.streams import Asked, Streams, TwistIn

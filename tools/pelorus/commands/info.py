@@ -10,9 +10,15 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.evaluate import survey_json
 from pelorus.evaluate.inertial_survey import ImuSurvey
-from pelorus.evaluate.survey import SensorSurvey, Survey, TrackSurvey, require_useful, survey
+from pelorus.evaluate.survey import (
+    SensorSurvey,
+    Survey,
+    TrackSurvey,
+    require_useful,
+    survey,
+    survey_json,
+)
 from pelorus.io.small_sensors import SMALL_SENSORS, WHEEL
 from pelorus.program.console import one_line, out, print_json
 from pelorus.wire.calibrated import Calibrated
@@ -39,7 +45,7 @@ def info(
     """
     found = survey(recording)
     if as_json:
-        print_json(survey_json.of(found))
+        print_json(survey_json(found))
         require_useful(found)
         return
     out.print(f"[bold]{escape(str(found.path))}[/]  {found.counts.bytes} bytes")

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import typer
 from rich.markup import escape
 
-from pelorus.commands.another import run_command
-from pelorus.commands.choices import CONFIG, SETTINGS, settings_given
-from pelorus.commands.watching import VIEW, watching
+from pelorus.commands.choices import CONFIG, SETTINGS, VIEW, settings_given, watching
+from pelorus.commands.outputs import run_command
 from pelorus.errors import Existing, PelorusError
 from pelorus.live.camera import CAMERAS, Asked, Camera, open_camera
 from pelorus.live.port import FORMS
@@ -23,9 +22,8 @@ from pelorus.online.diagnosis import Level, Status
 from pelorus.program.console import err, out, told
 
 if TYPE_CHECKING:
-    from pelorus.live.intake import Intake
     from pelorus.live.outputs import Output
-    from pelorus.live.session import Session
+    from pelorus.live.session import Intake, Session
     from pelorus.online.odometry import Odom
 
 CHECK_S = 60.0
@@ -178,7 +176,7 @@ def _outputs(
 
 def _drive(session: Session, camera: Camera, outputs: list[Output], seconds: float | None) -> None:
     """Until the camera ends, the time is over or somebody stops it; always to an end in order."""
-    from pelorus.live.intake import Intake  # noqa: PLC0415
+    from pelorus.live.session import Intake  # noqa: PLC0415
 
     intake, screen = Intake(camera), _Screen(session, outputs)
     try:
@@ -221,7 +219,7 @@ class _Screen:
     """A line that changes on a terminal, one every ten seconds elsewhere, and all news at once."""
 
     def __init__(self, session: Session, outputs: list[Output]) -> None:
-        from pelorus.live.line import HealthLine, News  # noqa: PLC0415
+        from pelorus.live.outputs import HealthLine, News  # noqa: PLC0415
 
         self._session, self._outputs = session, outputs
         self._line, self._news = HealthLine(), News()

@@ -99,9 +99,14 @@ def _publish(grid: Grid, title: str, folder: Path) -> None:
     files.write(folder, grid, lambda path: style.save(lambda: picture.draw(grid, title), path))
 
 
-def _json(grid: Grid, folder: Path) -> dict[str, Any]:
+def _counts(grid: Grid) -> dict[str, int]:
     found = files.cells(grid)
-    height, width = found.shape
+    kinds = {"free": files.FREE, "occupied": files.OCCUPIED, "unknown": files.UNKNOWN}
+    return {name: int(np.sum(found == kind)) for name, kind in kinds.items()}
+
+
+def _json(grid: Grid, folder: Path) -> dict[str, Any]:
+    height, width = grid.log_odds.shape
     return {
         "map": str(folder / files.TEXT),
         "resolution_m": grid.resolution_m,
@@ -111,21 +116,18 @@ def _json(grid: Grid, folder: Path) -> dict[str, Any]:
         "right": grid.plane.right.name,
         "up": grid.plane.up.name,
         "heights_m": grid.band,
-        "free": int(np.sum(found == files.FREE)),
-        "occupied": int(np.sum(found == files.OCCUPIED)),
-        "unknown": int(np.sum(found == files.UNKNOWN)),
+        **_counts(grid),
         "landmarks": grid.landmarks,
     }
 
 
 def _tell(grid: Grid, folder: Path) -> None:
-    found = files.cells(grid)
-    height, width = found.shape
+    height, width = grid.log_odds.shape
     x, y = grid.origin_m
     out.print(
         f"{width} x {height} cells of {grid.resolution_m:g} m, {files.heights(grid.band)}: "
-        f"{np.sum(found == files.FREE)} free, {np.sum(found == files.OCCUPIED)} occupied, "
-        f"{np.sum(found == files.UNKNOWN)} not known; {grid.landmarks} landmarks stand in it"
+        "{free} free, {occupied} occupied, {unknown} not known; ".format(**_counts(grid))
+        + f"{grid.landmarks} landmarks stand in it"
     )
     right, up = grid.plane.right.label, grid.plane.up.label
     out.print(f"lower left corner at ({x:g}, {y:g}); to the right {right}, upwards {up}")

@@ -12,21 +12,20 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.commands.verdicts import tell_verdict
+from pelorus.commands.outputs import tell_verdict
 from pelorus.errors import Existing, PelorusError, made, whole_folder
 from pelorus.io.trajectory import read_stamped
 from pelorus.native.replay import find_programs
 from pelorus.program.console import err, out, print_json, progress, step, steps, waiting
 from pelorus.program.extras import figures_missing
 from pelorus.report import words
-from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
+from pelorus.report.comparison import carry_out, plan_runs, read_subject, require_twists
 
 if TYPE_CHECKING:
     from pelorus.check.verdict import Verdict
     from pelorus.io.trajectory import Trajectory
-    from pelorus.report.comparison import Comparison
+    from pelorus.report.comparison import Comparison, Run
     from pelorus.report.curves import Other
-    from pelorus.report.results import Run
 
 PAGE = "report.html"
 STEPS = 3
@@ -48,7 +47,7 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example:  pelorus report drive.plr --out out --config robot.conf --set bias=on",
+    epilog="Example:  pelorus report drive.plr --out out --config robot.conf --set bias=on"
 )
 def report(
     recording: Path = typer.Argument(..., metavar="IN.plr", help="The recording to replay."),
@@ -118,10 +117,9 @@ def _draw(
 ) -> tuple[Verdict, list[str]]:
     """Writes pictures and page; returns the page's verdict, and further remarks."""
     from pelorus.explain import explain  # noqa: PLC0415 - as above
-    from pelorus.report import answers, page  # noqa: PLC0415 - as above
+    from pelorus.report import answers  # noqa: PLC0415 - as above
     from pelorus.report.beside import NamedLog, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
-    from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
     step("pictures")
     shown = _draw_pictures(compared, folder)
@@ -141,10 +139,7 @@ def _draw(
         verdict = found.verdict
     drift = drift_table([NamedLog(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
-    answer = answers.with_setup(answer, main.messages)
-    if source is not None:
-        answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
-    page.write(folder / PAGE, answer, curves)
+    answers.write_page(folder / PAGE, answer, curves, found, source, calibration)
     return verdict, lines
 
 

@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 import typer
 
 from pelorus.commands.choices import Timing
-from pelorus.commands.conversion import write
+from pelorus.commands.outputs import write
 from pelorus.errors import PelorusError
 from pelorus.io.recording import Recording
 from pelorus.io.small_sensors import SMALL_SENSORS, SmallSensor
@@ -133,23 +133,20 @@ def _parameter(
 
 def _values(settings: type, given: dict[str, Any]) -> dict[str, Any]:
     """Returns the fields of the dataclass from the command line's values."""
-    return {name: _value(name, given) for name in settings_of(settings)}
+    values = {
+        name: given[name] if name in given else _span(name, given) for name in settings_of(settings)
+    }
+    return {k: x.value_in_header if isinstance(x, Timing) else x for k, x in values.items()}
 
 
-def _value(name: str, given: dict[str, Any]) -> Any:
-    if name not in given:
-        return _span(name, given[f"{name}_from"], given[f"{name}_for"])
-    value = given[name]
-    return value.value_in_header if isinstance(value, Timing) else value
-
-
-def _span(name: str, from_s: float | None, for_s: float) -> Span | None:
-    if from_s is None:
-        if for_s:
-            option = option_name(name)
-            raise PelorusError(f"{option}-for is {for_s}: it needs {option}-from")
-        return None
-    return Span(from_s, for_s)
+def _span(name: str, given: dict[str, Any]) -> Span | None:
+    from_s, for_s = given[f"{name}_from"], given[f"{name}_for"]
+    if from_s is not None:
+        return Span(from_s, for_s)
+    if for_s:
+        option = option_name(name)
+        raise PelorusError(f"{option}-for is {for_s}: it needs {option}-from")
+    return None
 
 
 def _tell_blindness(recording: Recording) -> None:

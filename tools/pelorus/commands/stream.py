@@ -5,25 +5,21 @@ from __future__ import annotations
 
 import signal
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 import typer
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeRemainingColumn
 
-from pelorus.commands.choices import PROGRAMS
+from pelorus.commands.choices import PROGRAMS, VIEW, watching
 from pelorus.commands.compare import compare_log
-from pelorus.commands.watching import VIEW, watching
 from pelorus.errors import PelorusError, writing
 from pelorus.flight.judge import BitsVerdict
-from pelorus.program.console import err, one_line, out
-from pelorus.robot.emulator import MACHINES
-from pelorus.robot.state import restored, saved
-from pelorus.robot.status import refusal
-from pelorus.robot.stream import ANSWER_S, Streamer, StreamResult
-from pelorus.robot.target import BAUD, FORMS, open_target
+from pelorus.program.console import err, one_line, tell_lines
+from pelorus.robot.emulator import BAUD, FORMS, MACHINES, open_target
+from pelorus.robot.stream import ANSWER_S, Streamer, StreamResult, refusal, restored, saved
 from pelorus.wire import packed_file
 from pelorus.wire.frames import Kind, Message, Pose
 from pelorus.wire.framing import header_of, read_file
@@ -176,40 +172,30 @@ def _log_file(path: Path | None) -> Iterator[BinaryIO | None]:
             stream.close()
 
 
-class _Display:
-    """A bar with the latest position, on a terminal."""
-
-    def __init__(self, progress: Progress, total: int) -> None:
-        self._progress = progress
-        self._start_ns: int | None = None  # a clock may count from 1970
-        self._task = progress.add_task("streaming", total=total, where="waiting for the board")
-
-    def __call__(self, pose: Pose) -> None:
-        if self._start_ns is None:
-            self._start_ns = pose.t_ns
-        x, y, z = pose.p_WB_m
-        seconds = (pose.t_ns - self._start_ns) * 1e-9
-        where = f"{seconds:.2f} s   x {x:.2f}  y {y:.2f}  z {z:.2f} m"
-        self._progress.update(self._task, advance=1, where=where)
-
-
 @contextmanager
-def _display(messages: list[Message]) -> Iterator[_Display]:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=20),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[where]}"),
-    )
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
-        yield _Display(progress, _stereos(messages))
+def _display(messages: list[Message]) -> Iterator[Callable[[Pose], None]]:
+    """Yields what shows a pose: a bar with the latest position, on a terminal."""
+    columns = ("{task.description}", BarColumn(bar_width=20), TaskProgressColumn())
+    more = (TimeRemainingColumn(), "{task.fields[where]}")
+    start_ns: int | None = None  # a clock may count from 1970
+    quiet = not err.is_terminal
+    with Progress(*columns, *more, console=err, transient=True, disable=quiet) as progress:
+        total = _stereos(messages)
+        task = progress.add_task("streaming", total=total, where="waiting for the board")
+
+        def show(pose: Pose) -> None:
+            nonlocal start_ns
+            start_ns = pose.t_ns if start_ns is None else start_ns
+            x, y, z = pose.p_WB_m
+            seconds = (pose.t_ns - start_ns) * 1e-9
+            where = f"{seconds:.2f} s   x {x:.2f}  y {y:.2f}  z {z:.2f} m"
+            progress.update(task, advance=1, where=where)
+
+        yield show
 
 
 def _tell(outcome: StreamResult, record: Path | None) -> None:
-    """Prints a line for each thing, never cut: a board's own words and a path may be long."""
-    for name, words in _summary(outcome, record):
-        out.print(f"{name:<8}  {words}", markup=False)
+    tell_lines(_summary(outcome, record))
 
 
 def _summary(outcome: StreamResult, record: Path | None) -> Iterator[tuple[str, str]]:

@@ -14,7 +14,7 @@ from pelorus.commands.choices import CONFIG, LOG, PROGRAMS, SETTINGS, replay_opt
 from pelorus.errors import PelorusError, whole, write_text
 from pelorus.native.replay import whole_log_of
 from pelorus.program.console import out
-from pelorus.view.layout import layout
+from pelorus.view.in_foxglove import layout
 
 if TYPE_CHECKING:
     from pelorus.view.drive import Viewer

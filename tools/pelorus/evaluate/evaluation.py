@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The figures of a result against a reference: trajectory, covariance, map.
+"""The figures of a result against a reference: trajectory, covariance, drift, map.
 
 With T^ the estimate, T the truth, both at frames of equal time, and A = T^_0 T_0^-1 at the first:
 
@@ -14,7 +14,8 @@ which the world was laid for good: where the filter's position is known as it wa
 or some seconds after a start in motion (docs/MATH.md, the anchor). Frames before it do not count.
 A filter that has not started yet tells the pose that it was given, if only that of nobody: then
 the heading is compared at the first frame after it.
-What the filter knows besides is judged too, each state by its NEES (inertial_evaluation.py).
+What the filter knows besides is judged too, where TRUTH has it, each state by its own block of P;
+the biases, which have only variances in a POSE, by e^2 / variance.
 
 A figure that cannot be had is None: without truth or covariance, and the poses' own where they
 were given (mode mapping).
@@ -22,22 +23,74 @@ were given (mode mapping).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.evaluate import inertial_evaluation
 from pelorus.io.trajectory import Trajectory, estimate_in, filled, truth_in
 from pelorus.math import motion, se3
 from pelorus.math.consistency import Figures, mean, nees_per_dof, rms
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
-from pelorus.wire.frames import Landmark, Message, Role
+from pelorus.wire.frames import Landmark, Message, Pose, Role, Truth, TruthKnows
 from pelorus.wire.layout import Floats, unpack_symmetric
 from pelorus.wire.settings import in_force, mode_in_force
+
+INERTIAL_MEANING = {
+    "nees_position": "mean NEES of the position, a degree of freedom: 1 is expected",
+    "nees_rotation": "of the rotation",
+    "nees_velocity": "of the velocity",
+    "nees_bias_accel": "of the accelerometer's bias",
+    "nees_bias_gyro": "of the gyro's bias",
+    "velocity_rms_mps": "RMS velocity error",
+    "counted_from_s": "since the first frame, when the world was laid: no frame before it counts",
+}
+
+
+def inertial_figures(
+    messages: Sequence[Message], truths: Sequence[Message], t_ns: Times, error: Floats, P: Floats
+) -> Figures:
+    """Returns the figures of a result.
+
+    `truths` contain the TRUTH; error and P are those of the poses at t_ns (n, 6).
+    """
+    poses = {m.t_ns: m for m in messages if isinstance(m, Pose) and m.after_stereo}
+    found: Figures = dict.fromkeys(INERTIAL_MEANING)
+    found["counted_from_s"] = (int(t_ns[0]) - min(poses)) * 1e-9
+    later = slice(1, None)  # the alignment makes the first error zero
+    error, P = error[later], P[later]
+    found["nees_position"] = mean(nees_per_dof(error[:, :3], P[:, :3, :3]))
+    found["nees_rotation"] = mean(nees_per_dof(error[:, 3:], P[:, 3:, 3:]))
+    known = {m.t_ns: m for m in truths if isinstance(m, Truth)}
+    times = [t for t in t_ns[later].tolist() if t in known and poses[t].knows_covariance]
+    return found | _velocity(times, poses, known) | _biases(times, poses, known)
+
+
+def _velocity(times: list[int], poses: dict[int, Pose], known: dict[int, Truth]) -> Figures:
+    times = [t for t in times if known[t].knows & TruthKnows.VELOCITY]
+    if not times:
+        return {}
+    error = np.array([poses[t].v_B_mps - known[t].velocity for t in times])
+    P = unpack_symmetric(np.array([poses[t].velocity_covariance for t in times]), 6)
+    return {
+        "nees_velocity": mean(nees_per_dof(error, P[:, :3, :3])),
+        "velocity_rms_mps": rms(error),
+    }
+
+
+def _biases(times: list[int], poses: dict[int, Pose], known: dict[int, Truth]) -> Figures:
+    times = [t for t in times if known[t].knows & TruthKnows.BIAS]
+    times = [t for t in times if (np.asarray(poses[t].bias_variance) > 0).all()]
+    if not times:
+        return {}
+    error = np.array([poses[t].bias - known[t].bias for t in times])
+    nees = error**2 / np.array([poses[t].bias_variance for t in times])
+    return {"nees_bias_accel": mean(nees[:, :3]), "nees_bias_gyro": mean(nees[:, 3:])}
+
 
 MEANING = {
     "err0_m": "RMS position error, first poses aligned",
@@ -46,7 +99,7 @@ MEANING = {
     "scale": "by which the estimate is to be multiplied for that",
     "rot_deg": "RMS rotation error, first poses aligned",
     "nees_per_dof": "mean NEES of the pose, a degree of freedom: 1 is expected",
-    **inertial_evaluation.MEANING,
+    **INERTIAL_MEANING,
     "truth_frames": "poses compared",
     "nees_left_out": "of them with a covariance that has no inverse, left out of NEES",
     "path_m": "length of the trajectory",
@@ -317,6 +370,18 @@ def on_its_clock(
     return filled(truth, estimate.t_ns) if in_force(messages, "camera-offset") else truth
 
 
+def accuracy_of(
+    messages: Sequence[Message], truth: Trajectory | None = None, tolerance_ns: int = 0
+) -> Accuracy | None:
+    """Compares the poses of a result with the truth, by default its own; None without either."""
+    truth = truth_in(messages) if truth is None else truth
+    found = estimate_in(messages)
+    if truth is None or found is None:
+        return None
+    truth = on_its_clock(messages, truth, found[0])
+    return assess(found[0], truth, found[1], tolerance_ns, by_imu(messages))
+
+
 def judge(
     messages: Sequence[Message],
     truth: Trajectory | None = None,
@@ -328,21 +393,77 @@ def judge(
 
     `truths` are messages that may have more of the truth than its poses.
     """
-    truth = truth_in(messages) if truth is None else truth
-    found = estimate_in(messages)
-    if truth is not None and found is not None:
-        truth = on_its_clock(messages, truth, found[0])
-    accuracy = None
-    if found is not None and truth is not None:
-        accuracy = assess(found[0], truth, found[1], tolerance_ns, by_imu(messages))
+    accuracy = accuracy_of(messages, truth, tolerance_ns)
     figures: Figures = dict.fromkeys(OF_POSES) | {"truth_frames": 0}
     if accuracy is not None:
         figures = accuracy.figures
     if is_mapping(messages):
         figures |= dict.fromkeys(OF_POSES)
     elif accuracy is not None and by_imu(messages):
-        figures |= inertial_evaluation.figures(
+        figures |= inertial_figures(
             messages, truths or messages, accuracy.t_ns, accuracy.error, accuracy.P
         )
     A = accuracy.A if accuracy else se3.IDENTITY
     return figures | map_figures(_found_by_itself(messages), known or known_in(messages), A)
+
+
+# --- drift by length ------------------------------------------------------------------------------
+
+
+STARTS_MOST = 2000
+STARTS_LEAST = 10  # fewer say little, for they share most of their path
+LENGTHS_MOST = 7
+SHARE = 0.5  # of the path; longer ones have few distinct starts
+
+
+class Drift(NamedTuple):
+    """The drift over one length: RMS over `starts`."""
+
+    length_m: float
+    starts: int
+    position_m: float
+    rotation_deg: float
+
+    @property
+    def percent(self) -> float:
+        return 100 * self.position_m / self.length_m
+
+
+def drifts(accuracy: Accuracy) -> list[Drift]:
+    """Returns the drifts over lengths 1, 2, 5, 10 ... up to half the path; short ones first.
+
+    For each start i and length L, with j the first frame at which the true distance since i is L or
+    more, T the estimate and T* the truth:
+
+        E = (T_i^-1 T_j)^-1 (T*_i^-1 T*_j)
+
+    The figures are |p(E)| / L and the angle of R(E) / L, as RMS over the starts. Geiger, Lenz,
+    Urtasun: Are we ready for autonomous driving? The KITTI vision benchmark suite, 2012.
+    """
+    steps = np.linalg.norm(np.diff(accuracy.truth.p, axis=0), axis=1)
+    way = np.concatenate(([0.0], np.cumsum(steps)))
+    found = (_drift(accuracy, way, length) for length in _lengths(float(way[-1])))
+    return [drift for drift in found if drift is not None]
+
+
+def _lengths(whole_m: float) -> Iterator[float]:
+    if not np.isfinite(whole_m) or whole_m <= 0:
+        return
+    top = int(np.floor(np.log10(whole_m)))
+    ladder = [n * 10.0**k for k in range(top - 3, top + 1) for n in (1, 2, 5)]
+    yield from [length for length in ladder if length <= SHARE * whole_m][-LENGTHS_MOST:]
+
+
+def _drift(accuracy: Accuracy, way: Floats, length_m: float) -> Drift | None:
+    ends = np.searchsorted(way, way + length_m)
+    starts = np.nonzero(ends < len(way))[0]
+    starts = starts[:: -(-len(starts) // STARTS_MOST) or 1]
+    if len(starts) < STARTS_LEAST:
+        return None
+    mine, expected = (
+        se3.compose(se3.inverse(poses.at(starts)), poses.at(ends[starts]))
+        for poses in (accuracy.estimate, accuracy.truth)
+    )
+    error = se3.compose(se3.inverse(mine), expected)
+    angles = se3.log(error)[:, 3:]
+    return Drift(length_m, len(starts), rms(error.p), float(np.degrees(rms(angles))))

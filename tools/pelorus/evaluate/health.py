@@ -18,7 +18,6 @@ from itertools import pairwise
 from pelorus.wire import schema
 from pelorus.wire.frames import Kind, Message, Report
 
-GOOD, LOST = 0, 2
 PAUSE_NS = 1_000_000_000  # after which the filter itself reports NO_FRAMES
 NO_FRAMES = "no frames came"
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.math.inertial import Inertial
+from pelorus.math.motion import runs
 from pelorus.wire.frames import Imu
 from pelorus.wire.layout import Floats
 
@@ -85,18 +86,7 @@ def _ranges(numbers: Floats) -> tuple[tuple[float, float], ...]:
 
 def longest_run(flags: NDArray[np.bool_]) -> int:
     """Returns the length of the longest run of True."""
-    begin, end = _longest(flags)
-    return end - begin
-
-
-def _longest(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    """Returns begin and end of the longest run of True; (0, 0) if there is none."""
-    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
-    begins, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
-    if not len(begins):
-        return 0, 0
-    k = int((ends - begins).argmax())
-    return int(begins[k]), int(ends[k])
+    return max((last - first + 1 for first, last in runs(flags)), default=0)
 
 
 def _still(readings: Inertial) -> Still | None:
@@ -107,11 +97,12 @@ def _still(readings: Inertial) -> Still | None:
     window = (t_s / WINDOW_S).astype(np.int64)
     bounds = np.searchsorted(window, np.arange(window[-1] + 2))
     calm = np.array([_calm(readings, slice(*ends)) for ends in pairwise(bounds)])
-    begin, end = _longest(_joined(readings, bounds, calm))
-    begin = max(begin - 1, 0)  # the window to which the first one is joined
-    if (end - begin) * WINDOW_S < STILL_S:
+    joined = runs(_joined(readings, bounds, calm))
+    first, last = max(joined, key=lambda one: one[1] - one[0], default=(0, -1))
+    first = max(first - 1, 0)  # the window to which the first one is joined
+    if (last + 1 - first) * WINDOW_S < STILL_S:
         return None
-    return _found(readings.at(slice(int(bounds[begin]), int(bounds[end]))))
+    return _found(readings.at(slice(int(bounds[first]), int(bounds[last + 1]))))
 
 
 def _parts(readings: Inertial) -> tuple[Floats, Floats]:

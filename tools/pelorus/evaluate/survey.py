@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,10 +32,13 @@ from pelorus.wire.frames import (
     Text,
 )
 from pelorus.wire.framing import Counts, Received
+from pelorus.wire.schema import HEALTHS
+from pelorus.wire.settings import describe
 
 SAME_MOST = 10  # identical successive readings that the filter allows
 GRAVITY_OFF_MPS2 = 1.0
 GAP_RATIO = 1.5  # an interval that exceeds the median one by this ratio is a gap
+DAMAGE = ("damaged", "missing", "malformed", "unknown", "too_long")  # of Counts
 DATA = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.POSE)
 
 
@@ -269,3 +272,111 @@ def require_useful(found: Survey) -> None:
     """Raises PelorusError where nothing in the recording can be used."""
     if not found.useful:
         raise PelorusError(f"{found.path}: nothing useful in it: {'; '.join(found.remarks)}")
+
+
+# --- as JSON --------------------------------------------------------------------------------------
+
+
+def survey_json(found: Survey) -> dict[str, Any]:
+    """Returns everything that `info` shows; null where there is nothing. Times are in s from
+    `time_0_ns` on.
+    """
+    origin = found.origin_ns
+    counts = found.counts
+    config = found.configs[-1] if found.configs else None
+    return {
+        "recording": str(found.path),
+        "bytes": counts.bytes,
+        "useful": found.useful,
+        "time_0_ns": origin,
+        "header": None if found.header is None else _header_json(found.header),
+        "settings": None
+        if config is None
+        else dict(describe(*row) for row in config.settings.items()),
+        "settings_in_force": bool(config and config.build_fingerprint),
+        "frames": {kind.name: count for kind, count in counts.frames.items()},
+        "landmarks": found.landmarks,
+        "streams": {
+            kind.name: _stream_json(stream, origin) for kind, stream in found.streams.items()
+        },
+        "sensors": {
+            name: _stream_json(sensor.stream, origin)
+            | {key: value for key, value in vars(sensor).items() if key != "stream"}
+            for name, sensor in found.sensors.items()
+        },
+        "calibrated": found.calibrated.figures if found.calibrated else None,
+        "imu": None if found.imu is None else _imu_json(found.imu, origin),
+        "tracks": None if found.tracks is None else asdict(found.tracks),
+        "health": None if found.health is None else _health_json(found.health, origin),
+        "texts": [{"severity": text.severity, "text": text.text} for text in found.texts],
+        "remarks": found.remarks,
+        "damage": {
+            **{name: getattr(counts, name) for name in DAMAGE},
+            "faults": [fault._asdict() for fault in counts.faults],
+        },
+    }
+
+
+def _header_json(header: Header) -> dict[str, Any]:
+    return {
+        "version": [header.version_major, header.version_minor],
+        "name": header.name,
+        "body_axes": header.body_axes.name.lower().replace("_", "-"),
+        "process": header.process.name.lower(),
+        "twist_timing": header.twist_timing.name.lower(),
+        "image_px": [header.image_width_px, header.image_height_px],
+        **{name: _number(value) for name, value in vars(header.camera).items()},
+        "R_CB": [[_number(x) for x in row] for row in np.asarray(header.R_CB).tolist()],
+        "t_CB_m": [_number(x) for x in np.asarray(header.t_CB_m).tolist()],
+        "suggests": {name: value for name, value in vars(header.noise).items() if value >= 0},
+    }
+
+
+def _stream_json(stream: Stream, origin_ns: int) -> dict[str, Any]:
+    return {
+        "count": stream.count,
+        "from_s": _seconds(stream.first_ns - origin_ns),
+        "to_s": _seconds(stream.last_ns - origin_ns),
+        "rate_hz": stream.rate_hz,
+        "steps_back": stream.steps_back,
+        "gaps": [
+            {"after_s": _seconds(gap.after_ns - origin_ns), "length_s": _seconds(gap.length_ns)}
+            for gap in stream.gaps
+        ],
+    }
+
+
+def _imu_json(imu: ImuSurvey, origin_ns: int) -> dict[str, Any]:
+    found = asdict(imu)
+    if imu.still is not None:
+        still = found["still"]
+        still["from_s"] = _seconds(still.pop("from_ns") - origin_ns)
+        still["to_s"] = _seconds(still.pop("to_ns") - origin_ns)
+    return found
+
+
+def _health_json(health: TimeLine, origin_ns: int) -> dict[str, Any]:
+    return {
+        "frames": health.frames,
+        "before_start": health.before_start,
+        **health.by_health,
+        "spells": [
+            {
+                "health": HEALTHS[spell.health],
+                "from_s": _seconds(spell.from_ns - origin_ns),
+                "to_s": _seconds(spell.to_ns - origin_ns),
+                "frames": spell.frames,
+                "why": spell.why,
+            }
+            for spell in health.spells
+        ],
+    }
+
+
+def _seconds(ns: int) -> float:
+    return round(ns * 1e-9, 9)
+
+
+def _number(value: float) -> float | None:
+    """Returns null for NaN and infinity, which JSON does not have."""
+    return value if np.isfinite(value) else None

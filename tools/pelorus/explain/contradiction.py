@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus.explain.incident import Cause, Incident, S
 from pelorus.explain.inputs import AXES
-from pelorus.explain.log import FilterLog, Flags, runs, suspect
+from pelorus.explain.log import Cause, FilterLog, Flags, Incident, S, joined_runs, suspect
 from pelorus.io.tracks import Tracks
 from pelorus.math import motion, se3
 from pelorus.math.motion import Times
@@ -24,7 +23,7 @@ from pelorus.math.se3 import Poses
 from pelorus.tracking.visual_motion import PAIRS_MIN, distance2, estimate, rigid, seen_pairs
 from pelorus.wire.layout import Floats
 
-APART_S = 2.0  # stretches with a shorter gap are joined
+APART_NS = 2 * S - 1  # stretches with a gap of less than two seconds are joined
 LOOK_BACK_S = 2.0  # before the supervisor is sure
 LEARN_S = 5.0  # before that, from which the usual difference is learnt
 LEARN_LEAST = 10  # steps
@@ -54,20 +53,10 @@ def contradictions(log: FilterLog) -> Iterator[Incident]:
     """Yields a finding for each stretch of suspect frames that differs from what was before it."""
     if not len(log.readings):
         return
-    for first, last in _stretches(log):
+    for first, last in joined_runs(suspect(log), log.t_ns, APART_NS):
         found = _looked_at(log, first, last)
         if found is not None:
             yield found
-
-
-def _stretches(log: FilterLog) -> list[tuple[int, int]]:
-    out: list[tuple[int, int]] = []
-    for first, last in runs(suspect(log)):
-        if out and log.t_ns[first] - log.t_ns[out[-1][1]] < APART_S * S:
-            out[-1] = (out[-1][0], last)
-        else:
-            out.append((first, last))
-    return out
 
 
 def _looked_at(log: FilterLog, first: int, last: int) -> Incident | None:
@@ -116,7 +105,7 @@ def _as_told(log: FilterLog, first: int, last: int) -> Incident | None:
     cause = Cause.TURN_CONTRADICTED if axis >= 3 else Cause.CONTRADICTED
     if axis < 3 and not log.by_imu:
         cause = Cause.SLIP
-    return Incident(cause, int(log.t_ns[first]), int(log.t_ns[last]), words)
+    return log.incident(cause, first, last, words)
 
 
 def _least_sigma(log: FilterLog, steps: Steps) -> Floats:

@@ -12,12 +12,10 @@ import numpy as np
 
 from pelorus.evaluate.health import LOST, Spell, TimeLine, time_line
 from pelorus.explain.contradiction import contradictions
-from pelorus.explain.incident import Cause, Incident, S
-from pelorus.explain.inputs import of_inputs, rejected
-from pelorus.explain.log import FEW, FilterLog, Flags, log_of, runs
+from pelorus.explain.inputs import of_inputs, of_small, rejected
+from pelorus.explain.log import FEW, Cause, FilterLog, Flags, Incident, S, log_of
 from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
-from pelorus.explain.small import of_small
-from pelorus.explain.stamps import of_stamps
+from pelorus.math.motion import runs
 from pelorus.wire import schema
 from pelorus.wire.frames import Kind, Message, Text
 
@@ -200,7 +198,7 @@ def explain(messages: Sequence[Message]) -> Explanation:
     log = log_of(messages)
     health = time_line(messages)
     assert health is not None  # log_of refuses a log without answers
-    inputs = [*of_stamps(log), *of_inputs(log)]
+    inputs = list(of_inputs(log))
     odd = (*of_small(log, messages), *(_behind(one, inputs) for one in contradictions(log)))
     found = sorted((*inputs, *odd), key=_order)
     begin = found[0].from_ns if found else None
@@ -244,7 +242,7 @@ def divergences(log: FilterLog) -> Iterator[Incident]:
         count = last - first + 1
         words = f"a variance ceased to be positive in {count} frame{'s' * (count > 1)}; the filter "
         words += "went on from its pose and dropped its landmarks"
-        yield Incident(Cause.DIVERGED, int(log.t_ns[first]), int(log.t_ns[last]), words)
+        yield log.incident(Cause.DIVERGED, first, last, words)
 
 
 def _behind(found: Incident, inputs: Sequence[Incident]) -> Incident:

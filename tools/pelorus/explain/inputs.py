@@ -1,29 +1,46 @@
 # SPDX-License-Identifier: MIT
-"""Finds faults of readings, pictures and tracks themselves.
+"""Finds faults of readings, pictures, tracks and stamps themselves, and of small sensors.
 
-They do not depend on the filter's opinion, except on whether the body moved.
+They do not depend on the filter's opinion, except on whether the body moved. After a gap of the
+stamps the pictures tell a pause from a step of the clock: while the camera does not see, the body
+moves on; if the picture has moved no more than from frame to frame, no time has passed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import scipy
 
-from pelorus.explain.incident import Cause, Incident, S
-from pelorus.explain.log import CONTRADICTED, FEW, FilterLog, Flags, period, runs, suspect
-from pelorus.math.motion import Times
+from pelorus.explain.log import (
+    CONTRADICTED,
+    FEW,
+    NO_READING,
+    Cause,
+    FilterLog,
+    Incident,
+    S,
+    joined_runs,
+    period,
+    suspect,
+)
+from pelorus.io.small_sensors import name_of
+from pelorus.math.motion import Times, runs
 from pelorus.tracking.visual_motion import PAIRS_MIN
+from pelorus.wire.frames import Message, Reading
 from pelorus.wire.layout import Floats
-from pelorus.wire.schema import number
+from pelorus.wire.schema import SENSORS, number
 
 FROZEN_IMAGE = number("reason", "FROZEN_IMAGE")
 AXES = "xyz"
 
 
 def of_inputs(log: FilterLog) -> Iterator[Incident]:
-    """Yields all findings on the inputs."""
+    """Yields all findings on stamps, readings, pictures and tracks."""
+    yield from clock_steps(log)
+    yield from gaps(log)
+    yield from backwards(log)
     yield from stuck(log)
     yield from shocks(log)
     yield from frozen(log)
@@ -91,6 +108,7 @@ def _contradicted(log: FilterLog, begin: int, end: int) -> bool:
 FAR = 10.0  # factor of the deviation that 19 of 20 readings stay within
 NEIGHBOURHOOD_S = 2.0  # shorter than a slip, longer than an impact
 HIT_MOST_S = 1.0
+JOINED_NS = S // 2  # stretches with a gap of no more are one
 
 
 def shocks(log: FilterLog) -> Iterator[Incident]:
@@ -104,7 +122,7 @@ def shocks(log: FilterLog) -> Iterator[Incident]:
     )
     usual = np.quantile(off, 0.95, axis=0)
     times = np.divide(off, usual, out=np.zeros_like(off), where=usual > 0)
-    for first, last in _joined(times.max(axis=1) > FAR, log.reading_ns):
+    for first, last in joined_runs(times.max(axis=1) > FAR, log.reading_ns, JOINED_NS):
         begin, end = int(log.reading_ns[first]), int(log.reading_ns[last])
         if end - begin <= HIT_MOST_S * S and _suffered(log, begin, end):
             yield Incident(Cause.SHOCK, begin, end, _hit(log, times, first, last))
@@ -133,17 +151,6 @@ def _hit(log: FilterLog, times: Floats, first: int, last: int) -> str:
     )
 
 
-def _joined(flags: Flags, t_ns: Times) -> list[tuple[int, int]]:
-    """Returns the stretches of True, joined across gaps of half a second."""
-    out: list[tuple[int, int]] = []
-    for first, last in runs(flags):
-        if out and t_ns[first] - t_ns[out[-1][1]] <= S // 2:
-            out[-1] = (out[-1][0], last)
-        else:
-            out.append((first, last))
-    return out
-
-
 # --- pictures -------------------------------------------------------------------------------------
 
 
@@ -153,13 +160,12 @@ def frozen(log: FilterLog) -> Iterator[Incident]:
     told = log.said(FROZEN_IMAGE)
     for first, last in runs(same):
         if told[first : last + 1].any():
-            words = (
-                f"the picture is frozen: {last - first + 1} frames repeat the pixels of the first"
+            repeat = f"{last - first + 1} frames repeat the pixels of the first"
+            yield log.incident(
+                Cause.FROZEN_PICTURE, first, last, f"the picture is frozen: {repeat}"
             )
-            yield Incident(Cause.FROZEN_PICTURE, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
-BEFORE = 10  # frames that show how many points are usually followed
 HABIT_S = 10.0  # what happens more often is no event, but how the front end works
 TRACKED = 2 * FEW  # points that a frame mostly shares with the one before, where tracks can be lost
 
@@ -193,7 +199,7 @@ def lost_tracks(log: FilterLog) -> Iterator[Incident]:
         what = "few points in sight" if dark else "all points have new ids"
         frames = f"{last - first + 1} frames" if last > first else "one frame"
         words = f"tracks lost, {what}: {frames}; {before} points were followed before"
-        yield Incident(Cause.LOST_TRACKS, int(log.t_ns[first]), int(log.t_ns[last]), words)
+        yield log.incident(Cause.LOST_TRACKS, first, last, words)
 
 
 REJECTED_FRAMES = 2  # frames: a single one is no event
@@ -212,4 +218,142 @@ def rejected(log: FilterLog) -> Iterator[Incident]:
             f"the gate rejects {share:.0%} of the matches for {count} frames: blur, wrong matches, "
             "or much that moves by itself"
         )
-        yield Incident(Cause.WRONG_MATCHES, int(log.t_ns[first]), int(log.t_ns[last]), words)
+        yield log.incident(Cause.WRONG_MATCHES, first, last, words)
+
+
+# --- small sensors --------------------------------------------------------------------------------
+
+
+REJECTED = number("reason", "READINGS_REJECTED")
+FRAMES_LEAST = 2  # frames: a single one is no event
+
+
+def of_small(log: FilterLog, messages: Sequence[Message]) -> Iterator[Incident]:
+    """Yields stretches of frames with rejected readings, with sensors and the wheels' error."""
+    readings = [m for m in messages if isinstance(m, Reading)]
+    for first, last in runs(log.said(REJECTED)):
+        begin, end = int(log.t_ns[max(first - 1, 0)]), int(log.t_ns[last])
+        meanwhile = [m for m in readings if begin <= m.t_ns <= end]
+        if last - first + 1 < FRAMES_LEAST or not meanwhile:
+            continue
+        names = ", ".join(sorted({name_of(m.sensor) for m in meanwhile}))
+        words = f"readings of {names} are rejected, or off by more than their sigma"
+        yield Incident(Cause.READINGS_OFF, begin, end, words + _rolled(log, meanwhile))
+
+
+def _rolled(log: FilterLog, readings: Sequence[Reading]) -> str:
+    """Returns the forward speed by wheels and by the filter, in words."""
+    ahead = [m for m in readings if m.sensor == SENSORS["wheel"] and m.axes & 1]
+    poses = [pose for pose in log.poses if pose is not None]
+    if not ahead or not poses:
+        return ""
+    at = np.searchsorted([pose.t_ns for pose in poses], [m.t_ns for m in ahead])
+    known = [poses[k].v_B_mps[0] for k in np.minimum(at, len(poses) - 1)]
+    wheels = float(np.median([m.value[0] for m in ahead]))
+    return f": wheels {wheels:.2f} m/s ahead where the body goes {np.median(known):.2f} m/s"
+
+
+# --- stamps ---------------------------------------------------------------------------------------
+
+
+BEFORE, AFTER = 10, 5  # frames whose median shows what is usual before and after
+MAD = 1.4826  # of a normal distribution: sigma over the median absolute deviation
+JITTER_SIGMAS = 8.0  # no chance changes a stamp's lead by more
+
+
+def clock_steps(log: FilterLog) -> Iterator[Incident]:
+    """Yields steps of the frames' stamps against the readings', while they still arrive between
+    these.
+
+    The lead of a frame's stamp over the newest reading varies by a period of the readings, and by
+    the log's usual jitter. A step is larger, and lasts.
+    """
+    known = np.nonzero(log.behind_ns != NO_READING)[0]
+    if len(known) < BEFORE:
+        return
+    behind = log.behind_ns[known]
+    ahead = (log.t_ns[known] - behind).astype(np.float64)
+    frame_step, reading_step = np.diff(log.t_ns[known]), np.diff(behind)
+    usual = float(np.median(np.abs(frame_step)))
+    least = max(2 * period(log.reading_ns), JITTER_SIGMAS * _jitter(ahead))
+    for k in np.nonzero(np.abs(np.diff(ahead)) > least)[0] + 1:
+        before, after = ahead[max(k - BEFORE, 0) : k], ahead[k : k + AFTER]
+        if behind[k : k + AFTER][-1] == behind[-1]:
+            continue  # the readings have ended
+        by = float(np.median(after) - np.median(before))
+        if abs(by) <= least or np.ptp(before) > abs(by) / 2 or np.ptp(after) > abs(by) / 2:
+            continue
+        of_frames = abs(frame_step[k - 1] - usual) > abs(reading_step[k - 1] - usual)
+        whose, others = ("frames", "readings") if of_frames else ("readings", "frames")
+        which = "forward" if (by > 0) == of_frames else "back"
+        at = int(log.arrived_ns[known[k]] if of_frames else log.t_ns[known[k]])
+        words = f"the stamps of the {whose} step {which} by {abs(by) / S:.3f} s"
+        yield Incident(Cause.CLOCK_STEP, at, at, f"{words} against the {others}'")
+
+
+def _jitter(ahead: Floats) -> float:
+    """Returns the sigma of the lead from frame to frame; a single step does not affect it."""
+    change = np.diff(ahead)
+    return MAD * float(np.median(np.abs(change - np.median(change))))
+
+
+PAUSE_S = 1.0  # without a frame, after which the filter reports it
+PERIODS = 10  # missing ones: one or two are lost on any bus
+SAME_FLOW = 3.0  # ratio to the picture's motion between frames; ten periods make far more
+MOVES_PX = 1.0  # a smaller motion of the picture shows no time
+
+
+def gaps(log: FilterLog) -> Iterator[Incident]:
+    """Yields long gaps without a frame, or without a reading."""
+    name = "IMU reading" if log.by_imu else "twist"
+    for begin, end, _ in _long(log.reading_ns):
+        if _between(log.t_ns, begin, end):  # a gap of both is reported as one of the frames
+            words = f"no {name} for {(end - begin) / S:.1f} s"
+            yield Incident(Cause.NO_READINGS, begin, end, words)
+    for begin, end, k in _long(log.t_ns):
+        long = f"{(end - begin) / S:.1f} s"
+        alone = not _between(log.reading_ns, begin, end)
+        if _no_time_passed(log, k):
+            whose = "all stamps step" if alone else "the stamps of the frames step"
+            words = f"{whose} forward by {long}, and the pictures go on as if no time had passed"
+            yield Incident(Cause.CLOCK_STEP, begin, begin, words)
+            continue
+        both = f"neither frames nor {name}s for {long}: a pause, or a step of the clock of both"
+        yield Incident(Cause.NO_FRAMES, begin, end, both if alone else f"no frame for {long}")
+
+
+def _long(t_ns: Times) -> Iterator[tuple[int, int, int]]:
+    """Yields begin and end of each gap, and the number of what came before it."""
+    step = np.diff(t_ns)
+    for k in np.nonzero(step > max(PAUSE_S * S, PERIODS * period(t_ns)))[0]:
+        yield int(t_ns[k]), int(t_ns[k + 1]), int(k)
+
+
+def _between(t_ns: Times, begin: int, end: int) -> bool:
+    return bool(((t_ns > begin) & (t_ns < end)).any())
+
+
+def _no_time_passed(log: FilterLog, k: int) -> bool:
+    around = np.concatenate(
+        (log.flow_px[max(k - BEFORE, 0) : k + 1], log.flow_px[k + 2 : k + BEFORE])
+    )
+    around = around[np.isfinite(around)]
+    if not len(around) or not np.isfinite(log.flow_px[k + 1]):
+        return False
+    usual = float(np.median(around))
+    return usual > MOVES_PX and bool(log.flow_px[k + 1] < SAME_FLOW * usual)
+
+
+def backwards(log: FilterLog) -> Iterator[Incident]:
+    """Yields stamps that go back. A step of frames against readings is reported by clock_steps."""
+    name = "IMU readings" if log.by_imu else "twists"
+    streams = [(log.reading_ns, name)]
+    if (log.behind_ns == NO_READING).all():
+        streams.append((log.t_ns, "frames"))
+    for t, whose in streams:
+        back = np.nonzero(np.diff(t) < 0)[0]
+        if len(back):
+            at = int(t[back[0]])
+            by_s = int(t[back[0]] - t[back[0] + 1]) / S
+            words = f"the stamps of the {whose} go back by {by_s:.3f} s"
+            yield Incident(Cause.CLOCK_STEP, at, at, words)

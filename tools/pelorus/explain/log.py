@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""A filter's log by column: stereo frames with their answers, and readings."""
+"""A filter's log by column: stereo frames with their answers, and readings; and its incidents."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 from pelorus.io.trajectory import is_finite
-from pelorus.math.motion import Times
+from pelorus.math.motion import Times, runs
 from pelorus.wire import schema
 from pelorus.wire.evidence import Evidence, EvidenceFlag
 from pelorus.wire.frames import Header, Imu, Kind, Message, Pose, Report, Stereo, Twist
@@ -22,6 +24,81 @@ from pelorus.wire.framing import header_of_messages
 from pelorus.wire.layout import Floats
 from pelorus.wire.schema import number
 from pelorus.wire.settings import in_force
+
+S = 1_000_000_000
+
+
+class Cause(StrEnum):
+    """Causes, in causal order: of two that begin together the earlier one causes the other."""
+
+    CLOCK_STEP = "clock-step"
+    NO_READINGS = "no-readings"
+    NO_FRAMES = "no-frames"
+    SHOCK = "shock"
+    FROZEN_PICTURE = "frozen-picture"
+    DEAD_ODOMETRY = "dead-odometry"
+    DEAD_GYRO = "dead-gyro"
+    DEAD_ACCELEROMETER = "dead-accelerometer"
+    READINGS_OFF = "readings-off"
+    LOST_TRACKS = "lost-tracks"
+    JUMP = "jump"
+    SLIP = "slip"
+    TURN_CONTRADICTED = "turn-contradicted"
+    CONTRADICTED = "contradicted"
+    WRONG_MATCHES = "wrong-matches"
+    LOST = "lost"
+    DIVERGED = "diverged"
+    SETTINGS = "settings"
+
+
+class Incident(NamedTuple):
+    """An incident in a log.
+
+    `words` describe it without its time. `noticed_ns` is when the filter itself noticed it, where
+    that is later than it began.
+    """
+
+    cause: Cause
+    from_ns: int
+    to_ns: int
+    words: str
+    noticed_ns: int | None = None
+
+    @property
+    def rank(self) -> int:
+        return list(Cause).index(self.cause)
+
+    @property
+    def remedy(self) -> str:
+        """Returns what to check first."""
+        return REMEDIES[self.cause]
+
+
+REMEDIES = {
+    Cause.CLOCK_STEP: "stamp by a clock that nobody sets while the robot runs (monotonic)",
+    Cause.NO_READINGS: "look at the sensor's cable, driver and bus; what the filter says of the "
+    "motion meanwhile comes of a reading that is old",
+    Cause.NO_FRAMES: "look at the camera's cable, trigger and driver",
+    Cause.SHOCK: "nothing, where the robot fell or was hit; else look at the IMU's mount and range",
+    Cause.FROZEN_PICTURE: "look at the camera's driver: it hands on the same picture again",
+    Cause.DEAD_ODOMETRY: "look at the encoders, their cables and driver",
+    Cause.DEAD_GYRO: "look at the gyro's bus and driver",
+    Cause.DEAD_ACCELEROMETER: "look at the accelerometer's bus and driver",
+    Cause.READINGS_OFF: "nothing, where wheels slip; else look at the sensor's scale, place and "
+    "sigma (`pelorus check` measures wheels beside an IMU)",
+    Cause.LOST_TRACKS: "look at light, exposure and what was before the camera; a front end that "
+    "begins anew keeps no ids",
+    Cause.JUMP: "nothing, where the robot was pushed or carried; else look at the stamps there",
+    Cause.SLIP: "nothing, where wheels slip or traffic fills the picture; else look at the wheels "
+    "and, in `pelorus check`, at scale and timing",
+    Cause.TURN_CONTRADICTED: "look at the gyro: its axes, units and clock (`pelorus check`)",
+    Cause.CONTRADICTED: "`pelorus check` on the recording: scale, axes, clocks",
+    Cause.WRONG_MATCHES: "look at the front end's matches (`pelorus report --pictures`)",
+    Cause.LOST: "`pelorus report` shows the points of each frame, and which were rejected",
+    Cause.DIVERGED: "keep this log and report it: no input should do that. Beside "
+    "pelorus-replay-f64 it shows whether rounding did it",
+    Cause.SETTINGS: "`pelorus check` on the recording writes settings that fit",
+}
 
 Flags = NDArray[np.bool_]
 Counts = NDArray[np.int64]
@@ -66,6 +143,10 @@ class FilterLog:
     @property
     def origin_ns(self) -> int:
         return int(self.t_ns[0])
+
+    def incident(self, cause: Cause, first: int, last: int, words: str) -> Incident:
+        """Returns the incident of these frames."""
+        return Incident(cause, int(self.t_ns[first]), int(self.t_ns[last]), words)
 
     def column(self, name: str) -> Counts:
         """Returns a column of the REPORTs by its name."""
@@ -116,66 +197,66 @@ def _moved(first: Pixels, second: Pixels) -> tuple[int, float]:
     return repeated, float(np.median(np.hypot(*way.T))) if len(way) >= FEW else np.nan
 
 
+@dataclass
+class _Answered:
+    """A frame, and what a filter said of it."""
+
+    frame: Stereo
+    report: Report | None = None
+    pose: Pose | None = None
+    evidence: Evidence | None = None
+
+
 def log_of(messages: Sequence[Message]) -> FilterLog:
     """Reads a log; raises PelorusError where no frame was answered."""
-    frames, reports, poses, evidence = _answers(messages)
-    answered = [k for k, report in enumerate(reports) if report is not None]
-    if not answered:
+    frames = _answers(messages)
+    numbers = [k for k, one in enumerate(frames) if one.report is not None]
+    if not numbers:
         raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
+    answered = [frames[k] for k in numbers]
     behind, stamps, readings = _readings(messages)
+    refused = [m for m in messages if isinstance(m, Report) and m.status]
     return FilterLog(
         header_of_messages(messages),
-        [frames[k] for k in answered],
-        [report for report in reports if report is not None],
-        [poses[k] for k in answered],
-        [evidence[k] for k in answered],
-        behind[answered],
+        [one.frame for one in answered],
+        [one.report for one in answered if one.report is not None],
+        [one.pose for one in answered],
+        [one.evidence for one in answered],
+        behind[numbers],
         stamps,
         readings,
         any(isinstance(m, Imu) for m in messages),
-        [
-            m
-            for m in messages
-            if isinstance(m, Report) and m.subject in (Kind.TWIST, Kind.IMU) and m.status
-        ],
+        [m for m in refused if m.subject in (Kind.TWIST, Kind.IMU)],
         _sigma(messages, "velocity-sigma", "gyro-sigma"),
         _sigma(messages, "bias-velocity-sigma", "bias-gyro-sigma"),
     )
 
 
-def _answers(
-    messages: Sequence[Message],
-) -> tuple[list[Stereo], list[Report | None], list[Pose | None], list[Evidence | None]]:
+def _answers(messages: Sequence[Message]) -> list[_Answered]:
     """Returns all frames with their answers.
 
     A robot's answer comes late, and is matched by its time; a pose comes before its report,
     evidence after it.
     """
-    frames = [m for m in messages if isinstance(m, Stereo)]
-    reports: list[Report | None] = [None] * len(frames)
-    poses: list[Pose | None] = [None] * len(frames)
-    evidence: list[Evidence | None] = [None] * len(frames)
-    waiting: dict[int, list[int]] = {}
+    found: list[_Answered] = []
+    waiting: dict[int, list[_Answered]] = {}
     pose: Pose | None = None
-    last: int | None = None
-    arrived = 0
+    last: _Answered | None = None
     for m in messages:
         if isinstance(m, Stereo):
-            waiting.setdefault(m.t_ns, []).append(arrived)
-            arrived += 1
+            found.append(_Answered(m))
+            waiting.setdefault(m.t_ns, []).append(found[-1])
         elif isinstance(m, Pose) and m.after_stereo and is_finite(m):
             pose = m
         elif isinstance(m, Report) and m.subject == Kind.STEREO:
-            last = None
-            if asked := waiting.get(m.t_ns):
-                last = asked.pop(0)
-                reports[last], poses[last] = m, pose
-                if not asked:
-                    del waiting[m.t_ns]
+            asked = waiting.get(m.t_ns)
+            last = asked.pop(0) if asked else None
+            if last is not None:
+                last.report, last.pose = m, pose
             pose = None
         elif isinstance(m, Evidence) and last is not None:
-            evidence[last] = m
-    return frames, reports, poses, evidence
+            last.evidence = m
+    return found
 
 
 def _readings(messages: Sequence[Message]) -> tuple[Times, Times, Floats]:
@@ -220,13 +301,12 @@ def period(t_ns: Times) -> float:
     return float(np.median(np.abs(np.diff(t_ns)))) if len(t_ns) > 1 else 0.0
 
 
-def runs(flags: Flags) -> list[tuple[int, int]]:
-    """Returns first and last index of each stretch of True."""
-    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
-    return list(
-        zip(
-            np.nonzero(edges == 1)[0].tolist(),
-            (np.nonzero(edges == -1)[0] - 1).tolist(),
-            strict=True,
-        )
-    )
+def joined_runs(flags: Flags, t_ns: Times, apart_ns: int) -> list[tuple[int, int]]:
+    """Returns the stretches of True, joined across gaps of at most `apart_ns`."""
+    out: list[tuple[int, int]] = []
+    for first, last in runs(flags):
+        if out and t_ns[first] - t_ns[out[-1][1]] <= apart_ns:
+            out[-1] = (out[-1][0], last)
+        else:
+            out.append((first, last))
+    return out

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from pelorus.errors import PelorusError
 from pelorus.fleet.examine import OTHER, Work, digest_of_tools, examine_on_worker
-from pelorus.fleet.row import Found, Row
+from pelorus.fleet.table import Found, Row
 from pelorus.program.console import waiting
 from pelorus.program.extras import extra
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import io
 import os
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -19,9 +18,17 @@ from pelorus.check.checked import check
 from pelorus.check.options import options_of
 from pelorus.errors import PelorusError, made
 from pelorus.evaluate.evaluation import judge, path_m
-from pelorus.fleet.pieces import PIECE_BYTES, holds_answers, in_pieces
-from pelorus.fleet.row import Found, Row, finite
-from pelorus.fleet.whole import EVALUATED, Course, Part, columns_of, is_answered
+from pelorus.fleet.table import Found, Row, finite
+from pelorus.fleet.whole import (
+    EVALUATED,
+    PIECE_BYTES,
+    Course,
+    Part,
+    columns_of,
+    holds_answers,
+    in_pieces,
+    is_answered,
+)
 from pelorus.io.trajectory import estimate_in
 from pelorus.math.consistency import Figures
 from pelorus.native.replay import Outputs, find_programs, replay
@@ -150,7 +157,8 @@ class _Examination:
         return outputs.log, sum(int(summary[name]) for name in LOST)
 
     def _explained(self, log: Path, counts: Counts) -> dict[str, Any]:
-        pieces = _answered(in_pieces(log, counts, self.work.piece_bytes))
+        every = in_pieces(log, counts, self.work.piece_bytes)
+        pieces = (piece for piece in every if is_answered(piece))
         first = next(pieces, None)
         if first is None:
             raise PelorusError(f"{log}: holds no answer of a filter to a stereo frame")
@@ -176,11 +184,6 @@ class _Examination:
             "check_verdict": found.verdict.words,
             "check_changes": list(found.lines),
         }
-
-
-def _answered(pieces: Iterator[list[Message]]) -> Iterator[list[Message]]:
-    """Yields the pieces that a filter has answered."""
-    return (piece for piece in pieces if is_answered(piece))
 
 
 def _path_m(messages: list[Message]) -> float | None:

@@ -1,24 +1,75 @@
 # SPDX-License-Identifier: MIT
-"""Adds up what the pieces of one log tell."""
+"""Reads a log in pieces, and adds up what they tell.
+
+So one of ten hours needs no more memory than one of minutes: explaining a log takes some 20 bytes
+of memory for each of its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pelorus.check.known import Known
 from pelorus.check.verdict import Grade, Verdict, judged_log
 from pelorus.evaluate.evaluation import judge, path_m
 from pelorus.explain import Explanation, explain
-from pelorus.explain.incident import Cause, Incident
-from pelorus.fleet.row import finite
+from pelorus.explain.log import Cause, Incident
+from pelorus.fleet.table import finite
 from pelorus.io.trajectory import Trajectory, estimate_in, truth_in
 from pelorus.math.consistency import Figures
 from pelorus.math.se3 import Poses
-from pelorus.wire.frames import Config, Header, Kind, Landmark, Message, Pose, Report, Role, Truth
+from pelorus.wire.frames import (
+    Config,
+    Header,
+    Kind,
+    Landmark,
+    Message,
+    Pose,
+    Report,
+    Role,
+    Stereo,
+    Truth,
+)
+from pelorus.wire.framing import Counts, end_of, frames_in, without_header
+
+PIECE_BYTES = 16 << 20  # of frames on the wire: ten minutes of 60 points at 10 Hz, with the answers
+
+
+def in_pieces(path: Path, counts: Counts, piece_bytes: int) -> Iterator[list[Message]]:
+    """Yields the messages, at least one piece; each ends before a frame and has its own END.
+
+    What holds for all of it stands ahead of each piece: header, settings, known landmarks.
+    """
+    ahead: list[Message] = []
+    piece: list[Message] = []
+    begun = 0
+    for frame in frames_in(path, counts):
+        message = frame.message
+        if isinstance(message, Stereo) and frame.offset - begun >= piece_bytes:
+            yield [*piece, end_of(Counter(m.kind for m in piece))]
+            piece, begun = list(ahead), frame.offset
+        if _holds_for_all(message):
+            ahead.append(message)
+        piece.append(message)
+    if not any(isinstance(message, Header) for message in ahead):
+        raise without_header(path)
+    yield piece
+
+
+def _holds_for_all(message: Message) -> bool:
+    is_known = isinstance(message, Landmark) and message.role == Role.KNOWN
+    return is_known or isinstance(message, Header | Config)
+
+
+def holds_answers(piece: list[Message]) -> bool:
+    """Returns whether a filter has answered to the frames: it is a log, not a recording alone."""
+    return any(isinstance(m, Pose) and m.after_stereo for m in piece)
+
 
 POSES_MOST = 40_000  # of a long log: with more, every second one is left out, and again
 EVALUATED = (
@@ -45,21 +96,12 @@ class Part:
         run, known, verdict = judged_log(messages)
         names = ("gated", "matched", "innovation_d2", "innovation_rows")
         sums = {name: float(run.frames[name].sum()) for name in names}
-        faults, grave = _names(known)
+        faults = [fault.name for fault in known.faults]
+        grave = [fault.name for fault in known.faults if fault.grave]
         good = round(run.good_share * run.health.frames)
-        return cls(verdict, faults, grave, _light(found), run.health.frames, good, sums)
-
-
-def _light(found: Explanation) -> Explanation:
-    """Returns the explanation without the messages that it came from."""
-    return Explanation(
-        found.origin_ns, found.end_ns, found.episodes, found.setup, found.health, found.remarks,
-        found.unexplained,
-    )  # fmt: skip
-
-
-def _names(known: Known) -> tuple[list[str], list[str]]:
-    return [f.name for f in known.faults], [f.name for f in known.faults if f.grave]
+        return cls(
+            verdict, faults, grave, replace(found, messages=()), run.health.frames, good, sums
+        )
 
 
 @dataclass

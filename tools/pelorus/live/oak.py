@@ -17,7 +17,7 @@ import numpy as np
 
 from pelorus.errors import PelorusError
 from pelorus.io.named import Named
-from pelorus.live import factory
+from pelorus.live import camera
 from pelorus.live.camera import Asked, Force, Measured, Picture, Rate
 from pelorus.program.extras import extra
 from pelorus.rig.factory import depthai
@@ -64,7 +64,7 @@ class Oak:
         self._device: Any = device
         try:
             content = device.readCalibration().eepromToJson()
-            self.calibrated = factory.calibrated(asked, size, "OAK", lambda: rig_of(content))
+            self.calibrated = camera.calibrated(asked, size, "OAK", lambda: rig_of(content))
             rig = self.calibrated.rig
             self._swapped = rig_of(content).swapped if not asked.calibration else False
             self.remarks = self.calibrated.remarks if rig is not None else ()
@@ -120,6 +120,4 @@ class Oak:
                 yield Picture(nanoseconds(frame.getTimestamp(middle)), is_right, frame.getCvFrame())
 
 
-def open_camera(asked: Asked) -> Oak:
-    """Returns it, open."""
-    return Oak(asked)
+open_camera = Oak

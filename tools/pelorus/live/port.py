@@ -10,8 +10,8 @@ from typing import Protocol
 
 from pelorus.errors import PelorusError
 from pelorus.robot import link
+from pelorus.robot.emulator import BAUD
 from pelorus.robot.link import LinkClosed, LinkStalled
-from pelorus.robot.target import BAUD
 
 FORMS = "serial:DEVICE[:BAUD], udp:HOST:PORT, udpin:HOST:PORT or tcp:HOST:PORT"
 STALL_S = 0.05  # a port that takes nothing for so long loses the message: the next one is newer

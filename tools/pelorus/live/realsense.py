@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.live import factory
+from pelorus.live import camera
 from pelorus.live.camera import Asked, Force, Measured, Picture, Rate
 from pelorus.math.se3 import Poses
 from pelorus.program.extras import extra
@@ -95,7 +95,7 @@ class RealSense:
             self._set_options(profile.get_device())
             left, right = (profile.get_stream(rs.stream.infrared, k) for k in (1, 2))
             accel, gyro = (profile.get_stream(one) for one in (rs.stream.accel, rs.stream.gyro))
-            self.calibrated = factory.calibrated(
+            self.calibrated = camera.calibrated(
                 asked, size, "RealSense", lambda: rig_of(left, right, accel)
             )
             parts = (
@@ -142,6 +142,4 @@ class RealSense:
             yield Picture(t_ns, profile.stream_index() == 2, pixels)
 
 
-def open_camera(asked: Asked) -> RealSense:
-    """Returns it, open."""
-    return RealSense(asked)
+open_camera = RealSense

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import queue
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
+from pelorus.errors import PelorusError
 from pelorus.eyes.front_end import Seen
 from pelorus.live.camera import Camera, Force, Measured, Picture, Rate
 from pelorus.math import se3
@@ -22,6 +26,81 @@ from pelorus.online.drive import Setup
 from pelorus.online.odometry import Odom, Odometry
 from pelorus.online.pipeline import CAMERAS, G_MPS2, Pipeline, header_of
 from pelorus.wire.frames import Header, Imu, Message, Stereo
+
+PICTURES_MOST = 6  # that may wait to be followed: three pairs
+SILENCE_S = 5.0  # then the camera counts as gone
+LOOK_S = 0.2  # so often it is asked whether to stop
+
+
+class Arrival(NamedTuple):
+    """A measurement; `too_slow`: more pictures wait behind it than may."""
+
+    measured: Measured
+    too_slow: bool
+
+
+class Intake:
+    """Iterates over a camera's measurements until it ends, or until `stop` is set.
+
+    It takes them in a thread, so that no driver's queue overflows while the last picture is still
+    being followed. A recorded camera waits for its reader, and needs none.
+    """
+
+    def __init__(self, camera: Camera, silence_s: float = SILENCE_S) -> None:
+        self.stop = threading.Event()
+        self._camera, self._silence_s = camera, silence_s
+        self._queue: queue.SimpleQueue[Measured | BaseException | None] = queue.SimpleQueue()
+        self._pictures = 0  # in the queue; each side writes, and the GIL keeps the sum
+
+    def __iter__(self) -> Iterator[Arrival]:
+        if self._camera.recorded:
+            for one in self._camera.measured():
+                if self.stop.is_set():
+                    return
+                yield Arrival(one, False)
+            return
+        thread = threading.Thread(target=self._read, name="camera", daemon=True)
+        thread.start()
+        try:
+            yield from self._arrivals()
+        finally:
+            self.stop.set()
+            self._camera.close()
+            thread.join(timeout=self._silence_s)
+
+    def _read(self) -> None:
+        try:
+            for one in self._camera.measured():
+                if self.stop.is_set():
+                    break
+                self._pictures += isinstance(one, Picture)
+                self._queue.put(one)
+        except BaseException as error:
+            self._queue.put(error)
+            return
+        self._queue.put(None)
+
+    def _arrivals(self) -> Iterator[Arrival]:
+        silent_s = 0.0
+        while not self.stop.is_set():
+            try:
+                one = self._queue.get(timeout=LOOK_S)
+            except queue.Empty:
+                silent_s += LOOK_S
+                if silent_s >= self._silence_s:
+                    raise PelorusError(
+                        f"{self._camera.name}: has given nothing for {self._silence_s:g} s: is it "
+                        "still connected and powered (cable, hub, dmesg)? start again"
+                    ) from None
+                continue
+            silent_s = 0.0
+            if one is None:
+                return
+            if isinstance(one, BaseException):
+                raise one
+            self._pictures -= isinstance(one, Picture)
+            yield Arrival(one, self._pictures > PICTURES_MOST)
+
 
 REMEDY_FOR_G = f"multiply its readings by {G_MPS2:g}"
 # From axes forward, left, up at the left camera to its own: right, down, ahead.

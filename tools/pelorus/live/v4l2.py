@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.live import factory
-from pelorus.live.camera import Asked, Measured, Picture
-from pelorus.live.clock import OtherClock
+from pelorus.live import camera
+from pelorus.live.camera import Asked, Measured, OtherClock, Picture
 from pelorus.live.port import Wire
 from pelorus.program.extras import cv2
 from pelorus.rig.rig import Rig
@@ -82,7 +81,7 @@ class V4l2:
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, 2 * width)
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height)
         capture.set(cv2.CAP_PROP_FPS, asked.rate_hz or RATE_HZ)
-        self.calibrated = factory.calibrated(asked, (width, height), self.name, self._unknown)
+        self.calibrated = camera.calibrated(asked, (width, height), self.name, self._unknown)
         self.remarks = self.calibrated.remarks
         self._size, self._lines = (width, height), LineImu()
         self._pictures: SimpleQueue[Picture | None] = SimpleQueue()

@@ -82,3 +82,10 @@ def path_at(t_ns: Times, reading_t_ns: Times, v: Floats, w: Floats, timing: Twis
     return se3.compose(
         nodes.at(latest), se3.exp(tau[:, None] * v[latest], tau[:, None] * w[latest])
     )
+
+
+def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Returns first and last index of each stretch of True."""
+    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
+    begins, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0] - 1
+    return list(zip(begins.tolist(), ends.tolist(), strict=True))

@@ -11,8 +11,7 @@ import numpy as np
 
 from pelorus.evaluate.health import DEGRADED, GOOD, HARMLESS, SHORT
 from pelorus.online.odometry import Odom, Odometry
-from pelorus.online.pairs import Pairing
-from pelorus.online.together import Together
+from pelorus.online.order import Pairing, Together
 from pelorus.wire import schema
 
 MISSED_SHARE = 0.1  # of the pictures may lack their partner before it is told
@@ -64,10 +63,7 @@ ADVICE = {
     "REFUSED_INPUT": "tracks are malformed, or an id stands twice in a frame",
 }
 NOTHING_YET = Status(
-    "estimate",
-    Level.ERROR,
-    "nothing is estimated yet",
-    "camera and IMU (or wheels) must both send",
+    "estimate", Level.ERROR, "nothing is estimated yet", "camera and IMU (or wheels) must both send"
 )
 LEVELS = {GOOD: Level.OK, DEGRADED: Level.WARN}
 

@@ -220,7 +220,7 @@ class Drive:
                 P = UNKNOWN_COVARIANCE
             U = f.velocity_covariance()
         except FilterError:
-            P, U = UNKNOWN_COVARIANCE, UNKNOWN_COVARIANCE
+            P = U = UNKNOWN_COVARIANCE
         R, p = f.pose()
         reasons = health.reasons | (0 if report is None else report.reasons)
         worst = health.health if report is None else max(health.health, report.health)

@@ -60,6 +60,12 @@ out = SafeConsole(highlight=False, soft_wrap=True, emoji=False)
 err = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
+def tell_lines(lines: Iterable[tuple[str, str]]) -> None:
+    """Prints a line for each thing, never cut: a board's own words and a path may be long."""
+    for name, words in lines:
+        out.print(f"{name:<8}  {words}", markup=False)
+
+
 def print_json(found: dict[str, Any]) -> None:
     """Prints one object, the whole output of a command; numbers that are not finite become null."""
     out.print(json.dumps(_finite(found), indent=2, allow_nan=False), markup=False)

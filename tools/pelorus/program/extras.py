@@ -28,6 +28,8 @@ EXTRAS = {
     "pyrealsense2": ("a RealSense needs pyrealsense2", "realsense"),
     "distributed": ("a fleet needs Dask", "fleet"),
     "duckdb": ("a fleet's table needs DuckDB", "fleet"),
+    "rerun": ("this needs rerun", "view"),
+    "foxglove": ("this needs foxglove", "view"),
     "pyproj": ("places on the earth need pyproj", "geodetic"),
 }
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from pelorus.check.verdict import NOISES, Verdict
 from pelorus.explain.explanation import Episode, Explanation
 from pelorus.explain.log import log_of
-from pelorus.report.about import tables_of
-from pelorus.report.footage import CAPTION, Footage
-from pelorus.report.page import Answer, Event, PageTable
+from pelorus.report.beside import tables_of
+from pelorus.report.curves import Curves
+from pelorus.report.footage import CAPTION, footage
+from pelorus.report.page import Answer, Event, PageTable, write
 from pelorus.report.spectra import drawings
-from pelorus.wire.frames import Message
 
 if TYPE_CHECKING:
     from pelorus.check.checked import Checked
@@ -39,27 +39,31 @@ ALSO = (
 )
 
 
-def with_footage(answer: Answer, shown: Footage) -> Answer:
-    """Returns the answer with pictures."""
-    left_out = (
-        f"{len(shown.moments)} of {shown.frames} frames are shown: events, and some all along."
-    )
-    return replace(answer, moments=shown.moments, about_moments=f"{left_out} {CAPTION}")
+def write_page(
+    path: Path,
+    answer: Answer,
+    curves: Curves,
+    found: Explanation,
+    pictures: Path | None,
+    calibration: Sequence[Path],
+) -> None:
+    """Writes the answer with all that is seen in the log of the curves, which `found` explains.
 
-
-def with_setup(answer: Answer, messages: Sequence[Message]) -> Answer:
-    """Returns the answer with settings, calibration and remarks, and drawings without a time
-    axis.
+    Settings, calibration and remarks, drawings without a time axis, and `pictures` if given.
     """
-    drawn = tuple(drawings(log_of(messages)))
-    return replace(answer, tables=[*answer.tables, *tables_of(messages)], drawings=drawn)
+    tables, drawn = tables_of(curves.messages), tuple(drawings(log_of(curves.messages)))
+    answer = replace(answer, tables=[*answer.tables, *tables], drawings=drawn)
+    if pictures is not None:
+        shown = footage(curves.messages, found, pictures, calibration)
+        words = (
+            f"{len(shown.moments)} of {shown.frames} frames are shown: events, and some all along."
+        )
+        answer = replace(answer, moments=shown.moments, about_moments=f"{words} {CAPTION}")
+    write(path, answer, curves)
 
 
 def of_explanation(
-    found: Explanation,
-    title: str,
-    tables: Sequence[PageTable] = (),
-    facts: str = "",
+    found: Explanation, title: str, tables: Sequence[PageTable] = (), facts: str = ""
 ) -> Answer:
     """Returns the answer to an explanation of a log."""
     verdict = found.verdict

@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from pelorus.evaluate.evaluation import Accuracy, assess, by_imu, on_its_clock
+from pelorus.evaluate.evaluation import Accuracy, accuracy_of
 from pelorus.evaluate.frame_table import FrameTable, frame_table
 from pelorus.evaluate.health import GOOD, NOT_STARTED, SHORT
 from pelorus.grid.plane import AXES, choose
-from pelorus.io.trajectory import POSE_SIZE, Trajectory, estimate_in, truth_in
+from pelorus.io.trajectory import POSE_SIZE, Trajectory, estimate_in
 from pelorus.math.ellipsoids import ellipsoids
 from pelorus.math.motion import Times, nearest
-from pelorus.report.landmarks import WHY, Landmarks, packed
+from pelorus.report.landmarks import WHY, landmarks_json, packed
 from pelorus.report.packed import Packer
 from pelorus.wire import schema
 from pelorus.wire.evidence import Evidence
@@ -67,13 +67,11 @@ class Curves:
         self.left_out: list[str] = []
         self._others = others or {}
         self._beside = beside
-        self._messages = messages
+        self.messages = messages
         self._frames = self._thinned(frame_table(messages))
         self._t = self._seconds(self._frames.t_ns)
-        found = estimate_in(messages)
-        self._found = found
-        truth = truth_in(messages) if truth is None else truth
-        self.accuracy = _accuracy(messages, found, truth)
+        self._found = estimate_in(messages)
+        self.accuracy = accuracy_of(messages, truth)
 
     @property
     def origin_ns(self) -> int:
@@ -112,9 +110,13 @@ class Curves:
             "words": _words(),
             "charts": [self._packed(chart) for chart in self._charts()],
             "map": self._map(),
-            "landmarks": Landmarks(
-                self._messages, self.origin_ns, self._found and self._found[0], self.packer
-            ).json(self.left_out),
+            "landmarks": landmarks_json(
+                self.messages,
+                self.origin_ns,
+                self._found and self._found[0],
+                self.packer,
+                self.left_out,
+            ),
         }
 
     def _health_beside(self) -> dict[str, Any]:
@@ -295,7 +297,7 @@ class Curves:
             yield self._chart(title, unit, about, lines)
 
     def _true_biases(self) -> tuple[Floats, Floats]:
-        known = [m for m in self._messages if isinstance(m, Truth) and m.knows & TruthKnows.BIAS]
+        known = [m for m in self.messages if isinstance(m, Truth) and m.knows & TruthKnows.BIAS]
         if not known:
             nothing = np.full((len(self._t), 3), np.nan)
             return nothing, nothing
@@ -327,7 +329,7 @@ class Curves:
         return self._chart("Timing", "ms", about, lines, log=True)
 
     def _evidence(self) -> Iterator[dict[str, Any]]:
-        evidence = {m.t_ns: m for m in self._messages if isinstance(m, Evidence)}
+        evidence = {m.t_ns: m for m in self.messages if isinstance(m, Evidence)}
         if not evidence:
             return
         rows = [evidence.get(t) for t in self._frames.t_ns.tolist()]
@@ -361,7 +363,7 @@ class Curves:
         if self._found is None:
             return {"tracks": [], "axes": [0, 1]}
         trajectory = self._found[0]
-        plane = choose(header_of_messages(self._messages).body_axes, trajectory.poses)
+        plane = choose(header_of_messages(self.messages).body_axes, trajectory.poses)
         tracks = [self._track("estimate", trajectory.t_ns, trajectory.poses.p)]
         if self.accuracy is not None:
             tracks.append(self._track("truth", self.accuracy.t_ns, self.accuracy.truth.p))
@@ -395,11 +397,7 @@ class Curves:
         }
 
     def _track(
-        self,
-        name: str,
-        t_ns: Times,
-        p: Floats,
-        seconds: Callable[[Times], Floats] | None = None,
+        self, name: str, t_ns: Times, p: Floats, seconds: Callable[[Times], Floats] | None = None
     ) -> dict[str, Any]:
         some = slice(None, None, -(-len(p) // FRAMES_MOST))
         since = (seconds or self._seconds)(t_ns)[some]
@@ -442,14 +440,3 @@ def _words() -> dict[str, Any]:
         "status": {str(k): words.partition(":")[0] for k, words in schema.STATUSES.items()},
         "why": {str(k): words for k, words in WHY.items()},
     }
-
-
-def _accuracy(
-    messages: Sequence[Message],
-    found: tuple[Trajectory, Floats] | None,
-    truth: Trajectory | None,
-) -> Accuracy | None:
-    if found is None or truth is None:
-        return None
-    on_clock = on_its_clock(messages, truth, found[0])
-    return assess(found[0], on_clock, found[1], upright=by_imu(messages))

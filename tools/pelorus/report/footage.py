@@ -69,10 +69,7 @@ class _Source(NamedTuple):
 
 
 def footage(
-    messages: Sequence[Message],
-    found: Explanation,
-    source: Path,
-    calibration: Sequence[Path] = (),
+    messages: Sequence[Message], found: Explanation, source: Path, calibration: Sequence[Path] = ()
 ) -> Footage:
     """Returns the pictures of a log; raises PelorusError where they are not this log's.
 

@@ -49,7 +49,7 @@ class PageTable:
 
 @dataclass(frozen=True)
 class Drawing:
-    """SVG, made by drawings.py."""
+    """SVG, made by spectra.py."""
 
     title: str
     about: str

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pelorus.report.comparison import Comparison
-from pelorus.report.results import Run
+from pelorus.report.comparison import Comparison, Run
 from pelorus.wire import schema
 from pelorus.wire.frames import Header
 

@@ -17,19 +17,19 @@ from typing import BinaryIO
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.robot.flight_log import SETUP_KINDS, FlightLog
 from pelorus.robot.link import Link
-from pelorus.robot.status import refusal
 from pelorus.wire.frames import (
     Config,
     End,
     Header,
+    Imu,
     Kind,
     Landmark,
     Message,
     Notice,
     Pose,
     Process,
+    Reading,
     Report,
     Start,
     StartFlag,
@@ -37,9 +37,86 @@ from pelorus.wire.frames import (
     StateAction,
     Stereo,
     Text,
+    Truth,
+    Twist,
 )
-from pelorus.wire.framing import DELIMITER, Counts, Reader, encode, end_of
+from pelorus.wire.framing import DELIMITER, Counts, Reader, Writer, encode, end_of
+from pelorus.wire.schema import HEALTHS, REASONS, STATUSES
 from pelorus.wire.settings import IDS
+
+SETUP_KINDS = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK, Kind.START)
+
+
+class FlightLog:
+    """Records what host and board said to each other, in that order, for a replay.
+
+    A board sends its settings in answer to the first data, and a replay must have them before: so
+    the first data are held back until they come. Every message is handed to the system at once, so
+    that a log that is cut short is complete up to there.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._writer = Writer(stream)
+        self._held: list[Message] = []
+        self._settled = False  # the settings are in the log, or will not come
+
+    def keep(self, message: Message, heard: bool = False) -> None:
+        """Adds a message that was sent, or received from the board: CONFIG has the settings."""
+        if heard and isinstance(message, Config) and message.build_fingerprint:
+            self._write(message)
+            self.release()
+        elif self._settled or (message.kind in SETUP_KINDS and not self._held):
+            self._write(message)
+        else:
+            self._held.append(message)
+            if isinstance(message, Report) and message.subject == Kind.STEREO:
+                self.release()  # a frame was answered, without settings before
+
+    def release(self) -> None:
+        """Writes what is held back; from then on nothing is."""
+        self._settled = True
+        held, self._held = self._held, []
+        for message in held:
+            self._write(message)
+
+    def end(self, heard: End | None = None) -> None:
+        """Closes the recording with END; `heard` is the board's."""
+        self.release()
+        try:
+            self._writer.end(heard)
+            self._stream.flush()
+        except OSError as error:
+            raise self._trouble(error) from error
+
+    def _write(self, message: Message) -> None:
+        try:
+            self._writer.write(message)
+            self._stream.flush()
+        except OSError as error:
+            raise self._trouble(error) from error
+
+    def _trouble(self, error: OSError) -> PelorusError:
+        name = getattr(self._stream, "name", "the log")
+        return PelorusError(f"{name}: cannot be written: {error.strerror}; the log ends there")
+
+
+def condition(health: int, reasons: int) -> str:
+    """Returns `plr_health` with its `plr_reason`: "degraded (the gate is locked)"."""
+    words = [text for reason, text in REASONS.items() if reasons & reason]
+    name = HEALTHS.get(health, f"health {health}")
+    return f"{name} ({', '.join(words)})" if words else name
+
+
+def refusal(subject: int, status: int, count: int) -> str:
+    """Returns one line of a summary of refusals."""
+    known = subject in list(Kind)
+    what = Kind(subject).name if known else f"kind {subject}"
+    if subject == 0:
+        what = "frames"
+    why = STATUSES.get(status, "no status of this version")
+    return f"{count} {what}: {why} (status {status})"
+
 
 ANSWER_S = 5.0  # a slow emulated board on a busy machine takes tenths
 QUIET_S = 0.3
@@ -330,3 +407,32 @@ def start_from(pose: Pose, inertial: bool = False) -> Start:
         velocity=np.asarray(pose.v_B_mps),
         velocity_variance=np.asarray(pose.velocity_covariance)[[0, 2, 5]],
     )
+
+
+# --- a kept state ---------------------------------------------------------------------------------
+
+
+def restored(messages: list[Message], moved: tuple[float, float] = (0.0, 0.0)) -> list[Message]:
+    """Returns the drive with a restore right before its data, instead of its START.
+
+    `moved` is how far the robot may have moved since it was saved: sigmas in m and rad.
+    """
+    first, t_ns = _data(messages)[0]
+    setup = [message for message in messages[:first] if message.kind != Kind.START]
+    state = State(t_ns, StateAction.RESTORE, np.repeat(np.square(moved), 3))
+    return [*setup, state, *messages[first:]]
+
+
+def saved(messages: list[Message]) -> list[Message]:
+    """Returns the drive with a save after its data."""
+    last, t_ns = _data(messages)[-1]
+    return [*messages[: last + 1], State(t_ns, StateAction.SAVE), *messages[last + 1 :]]
+
+
+def _data(messages: list[Message]) -> list[tuple[int, int]]:
+    """Returns the indices of the data, and their times."""
+    data = Twist | Imu | Reading | Truth | Stereo
+    found = [(at, message.t_ns) for at, message in enumerate(messages) if isinstance(message, data)]
+    if not found:
+        raise PelorusError("the recording holds no data, so there is no state to save or restore")
+    return found

@@ -1,30 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Simulates an IMU: its readings and its faults."""
+"""Simulates an IMU, its readings and its faults, and a drive with it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.io.recording import Recording
 from pelorus.math.inertial import GRAVITY_MPS2, Inertial
 from pelorus.math.motion import Times
-from pelorus.simulate import sensors, settings
-from pelorus.simulate.drive import wave
-from pelorus.simulate.settings import (
-    BELOW_ONE,
-    FINITE,
-    POSITIVE,
-    Rule,
-    Span,
-    require,
-    setting,
-)
-from pelorus.wire.frames import IMU_READINGS_MAX
-from pelorus.wire.layout import Floats
+from pelorus.simulate import drive, sensors, settings
+from pelorus.simulate.drive import Drive, wave
+from pelorus.simulate.settings import BELOW_ONE, FINITE, POSITIVE, Rule, Span, require, setting
+from pelorus.wire.frames import IMU_READINGS_MAX, Noise, Process, Start, StartFlag
+from pelorus.wire.layout import Floats, pack_symmetric
 
 RATES = Rule(lambda x: x == 0 or 100 <= x <= 1000, "100 to 1000 Hz, or 0 for twists,")
 SPIKE_MPS2, SPIKE_RADPS = 160.0, 35.0  # full scale of usual parts: 16 g, 2000 degrees a second
@@ -236,3 +229,116 @@ def _replaced(
     rows = np.hstack((a, w))
     rows[hit, which[hit]] = by[hit]
     return rows[:, :3], rows[:, 3:]
+
+
+# --- a drive with it ------------------------------------------------------------------------------
+
+
+class ImuDrive(NamedTuple):
+    """The options on which an IMU depends."""
+
+    way: drive.Way
+    imu: SimulatedImu
+    faults: ImuFaults
+    bias_gyro_sigma_radps: float
+
+
+def drive_and_read(given: ImuDrive, t_ns: Times, chances: sensors.Chances) -> tuple[Drive, Sensed]:
+    """Returns the motion at t_ns, and the readings over the same time."""
+    own = given.imu.times(int(t_ns[-1]))
+    times = np.union1d(t_ns, own)
+    poses = drive.way_poses(times, given.way)
+    v, w = given.way.velocities(drive.seconds(times))
+    at, nodes = np.searchsorted(times, own), np.searchsorted(times, t_ns)
+    a = drive.specific_force(own, given.way, poses.R[at], given.imu.gravity_mps2)
+    sensed = read(
+        given.imu,
+        given.faults,
+        given.bias_gyro_sigma_radps,
+        Inertial(own, a, w[at]),
+        chances["imu"],
+        chances["imu_faults"],
+    )
+    return Drive(t_ns, v[nodes], w[nodes], poses.at(nodes)), sensed
+
+
+def driven(
+    recording: Recording, given: ImuDrive, sensed: Sensed, chance: np.random.Generator
+) -> Recording:
+    """Returns the recording with an IMU's readings instead of twists."""
+    none: Floats = np.empty((0, 3))
+    ahead_ns = round(given.faults.camera_offset_s * 1e9)
+    late_ns = max(ahead_ns, 0)  # of all but the frames, for no time may be negative
+    recording = replace(
+        recording,
+        twist_t_ns=np.empty(0, np.int64),
+        v_B_mps=none,
+        w_B_radps=none,
+        frame_t_ns=recording.frame_t_ns + late_ns - ahead_ns,
+        truth_t_ns=recording.truth_t_ns + late_ns,
+        readings=[replace(m, t_ns=m.t_ns + late_ns) for m in recording.readings],
+        inertial=sensed.readings._replace(t_ns=sensed.readings.t_ns + late_ns),
+        imu_batch=given.imu.imu_batch,
+        twist_delay_ns=round(given.faults.imu_delay_s * 1e9),
+        start=_start(recording, given, chance, late_ns),
+        truth_velocity=given.way.velocities(drive.seconds(recording.truth_t_ns))[0],
+        truth_bias=_biases(sensed, recording.truth_t_ns),
+    )
+    noise = recording.header.noise
+    return recording.with_header(process=Process.IMU, noise=_noise(noise, given))
+
+
+def _biases(sensed: Sensed, t_ns: Times) -> Floats:
+    """Returns (n, 6) biases at these times, in the order of START."""
+    own = sensed.true._replace(a_B_mps2=sensed.bias_accel, w_B_radps=sensed.bias_gyro)
+    return np.hstack(own.between(t_ns)[1:])
+
+
+def _noise(noise: Noise, given: ImuDrive) -> Noise:
+    """Returns the noise; zero noise becomes no suggestion."""
+    imu = given.imu
+    told = {
+        "gyro_noise": imu.gyro_noise,
+        "accel_noise": imu.accel_noise,
+        "gyro_walk": imu.gyro_walk,
+        "accel_walk": imu.accel_walk,
+        "bias_accel_sigma": imu.bias_accel_sigma_mps2,
+    }
+    kept = {
+        name: value
+        for name, value in vars(noise).items()
+        if name in ("pixel_sigma_px", "bias_gyro_sigma_radps")
+    }
+    suggested = {name: value if value > 0 else -1.0 for name, value in told.items()}
+    return Noise(**kept, **suggested, gravity=imu.gravity_mps2)
+
+
+def _start(
+    recording: Recording, given: ImuDrive, chance: np.random.Generator, late_ns: int
+) -> Start | None:
+    """Returns the first pose, with errors of roll, pitch and velocity by their sigmas.
+
+    Position and yaw are exact, for nothing can be learnt of them.
+    """
+    imu = given.imu
+    if imu.start is StartGiven.NONE:
+        return None
+    R, p = recording.truth.at(0)
+    v, _ = given.way.velocities(drive.seconds(recording.truth_t_ns[:1]))
+    wrong = imu.start_tilt_sigma_rad * chance.standard_normal(3)
+    wrong[2] = 0.0
+    faulty = v[0] + imu.start_velocity_sigma_mps * chance.standard_normal(3)
+    tilt = np.eye(3) - np.outer(R[2], R[2])
+    covariance: Floats = np.zeros((6, 6))
+    covariance[3:, 3:] = imu.start_tilt_sigma_rad**2 * tilt
+    start = Start(
+        int(recording.truth_t_ns[0]) + late_ns,
+        drive.exp(np.zeros((1, 3)), wrong[None]).R[0] @ R,
+        p,
+        StartFlag.COVARIANCE,
+        pack_symmetric(covariance),
+    )
+    if imu.start is StartGiven.POSE:
+        return start
+    variance = np.full(3, imu.start_velocity_sigma_mps**2)
+    return replace(start, velocity=faulty, velocity_variance=variance)

@@ -17,21 +17,9 @@ from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 
-UNITS = (
-    "_s",
-    "_ns",
-    "_hz",
-    "_mps",
-    "_mps2",
-    "_radps",
-    "_rad",
-    "_px",
-    "_m",
-    "_percent",
-    "_deg",
-)  # an option's name has no unit
-
-
+UNITS = (  # an option's name has none
+    *("_s", "_ns", "_hz", "_mps", "_mps2", "_radps", "_rad", "_px", "_m", "_percent", "_deg"),
+)
 Numbers = tuple[float, ...]  # an option of several numbers, separated by commas
 
 

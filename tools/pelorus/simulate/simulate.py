@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pelorus.io.recording import Recording
 from pelorus.io.small_sensors import SMALL_SENSORS, Motion, SmallSensor
@@ -16,11 +15,21 @@ from pelorus.math import motion
 from pelorus.math.motion import Times
 from pelorus.math.se3 import Poses
 from pelorus.program.console import progress
-from pelorus.simulate import by_imu, scene, sensors, settings, smooth
-from pelorus.simulate.drive import TURN_MAX_RAD, Drive, drive, exp, rotate, stood
-from pelorus.simulate.imu import NO_FAULTS, NO_IMU, ImuFaults, Sensed, SimulatedImu
+from pelorus.simulate import sensors, settings
+from pelorus.simulate.drive import TURN_MAX_RAD, Drive, Way, drive, exp, rotate, stood, way_poses
+from pelorus.simulate.imu import (
+    NO_FAULTS,
+    NO_IMU,
+    ImuDrive,
+    ImuFaults,
+    Sensed,
+    SimulatedImu,
+    drive_and_read,
+    driven,
+)
 from pelorus.simulate.mishaps import NO_MISHAPS, Flags, Mishaps, TrackDrift
 from pelorus.simulate.readings import Sensing, read
+from pelorus.simulate.sensors import Chances, Depths
 from pelorus.simulate.settings import (
     AT_LEAST_ONE,
     BELOW_ONE,
@@ -80,7 +89,7 @@ class Options:
     max_depth_m: float = setting(
         0.0, "None is seen farther, and --range gives way; 0: --range.", "M"
     )
-    baseline_m: float = setting(scene.CAMERA.baseline_m, "Of the stereo camera.", "M", POSITIVE)
+    baseline_m: float = setting(sensors.CAMERA.baseline_m, "Of the stereo camera.", "M", POSITIVE)
     range_m: float = setting(30.0, "How far is seen.", "M", POSITIVE)
     keep_ids: bool = setting(False, "A landmark seen again has its old id: loops close.")
     known: bool = setting(False, "Write the landmarks as known ones (implies --keep-ids).")
@@ -145,8 +154,8 @@ class Options:
         return [sensor for sensor in SMALL_SENSORS if sensor.name in self.readings]
 
     @property
-    def depths(self) -> scene.Depths:
-        return scene.Depths(self.min_depth_m, self.max_depth_m)
+    def depths(self) -> Depths:
+        return Depths(self.min_depth_m, self.max_depth_m)
 
     @property
     def seen_m(self) -> float:
@@ -155,18 +164,18 @@ class Options:
         return max(self.range_m, 2 * deepest)
 
     @property
-    def way(self) -> smooth.Way:
+    def way(self) -> Way:
         """Returns the path of a body with an IMU, which needs accelerations."""
-        return smooth.Way(self.speed_mps, self.lap_s, self.imu.rest_s, self.stop, self.parked)
+        return Way(self.speed_mps, self.lap_s, self.imu.rest_s, self.stop, self.parked)
 
     @property
-    def imu_drive(self) -> by_imu.ImuDrive:
-        return by_imu.ImuDrive(self.way, self.imu, self.imu_faults, self.bias_gyro_sigma_radps)
+    def imu_drive(self) -> ImuDrive:
+        return ImuDrive(self.way, self.imu, self.imu_faults, self.bias_gyro_sigma_radps)
 
     @property
     def camera(self) -> Camera:
         """Returns the HEADER's camera."""
-        return replace(scene.CAMERA, baseline_m=self.baseline_m)
+        return replace(sensors.CAMERA, baseline_m=self.baseline_m)
 
     @property
     def frames(self) -> int:
@@ -180,21 +189,6 @@ class Options:
     def lookahead_s(self) -> float:
         """Returns how far beyond the drive's end landmarks are needed: the camera looks ahead."""
         return min(self.range_m / self.speed_mps, self.lap_s) if self.speed_mps else 0.0
-
-
-class _Chances:
-    """An independent random generator for each source: changing one option leaves the others."""
-
-    def __init__(self, seed: int) -> None:
-        names = ("scene", "tracker", "pixels", "outliers", "drops", "velocity", "gyro", "bias_v")
-        later = ("bias_w", "drift", "moving", "moving_ways")
-        latest = ("imu", "imu_faults", "start")
-        self._names = (*names, *later, *(sensor.name for sensor in SMALL_SENSORS), *latest)
-        seeds = np.random.SeedSequence(seed).spawn(len(self._names))
-        self._streams = [np.random.Generator(np.random.PCG64(s)) for s in seeds]
-
-    def __getitem__(self, name: str) -> np.random.Generator:
-        return self._streams[self._names.index(name)]
 
 
 @dataclass(frozen=True)
@@ -212,11 +206,11 @@ class Simulation:
 def simulate(options: Options) -> Simulation:
     """Simulates a drive: motion, scene and measurements."""
     options.check()
-    chances = _Chances(options.seed)
+    chances = Chances(options.seed)
     points = _landmarks(options, chances)
     t_ns = _node_times(options)
     if options.imu.is_there:
-        way, sensed = by_imu.drive_and_read(options.imu_drive, t_ns, chances)
+        way, sensed = drive_and_read(options.imu_drive, t_ns, chances)
     else:
         way, sensed = _way(options, t_ns), None
     v, w, bias_v, bias_w = _readings(options, way, chances)
@@ -241,7 +235,7 @@ def simulate(options: Options) -> Simulation:
         settings=_exact_camera(options),
     )
     if sensed is not None:
-        recording = by_imu.driven(recording, options.imu_drive, sensed, chances["start"])
+        recording = driven(recording, options.imu_drive, sensed, chances["start"])
     return Simulation(recording, points, bias_v, bias_w, outlier, sensed)
 
 
@@ -252,17 +246,17 @@ def _exact_camera(options: Options) -> dict[str, float]:
     return {} if off else dict.fromkeys(CALIBRATION_SIGMAS, 0.0)
 
 
-def _landmarks(options: Options, chances: _Chances) -> Floats:
+def _landmarks(options: Options, chances: Chances) -> Floats:
     """Returns landmarks beside the path and beyond its end.
 
     A parked body sees those of the path on which it could drive.
     """
     t_ns = _node_times(options, options.lookahead_s)
     if options.imu.is_there:
-        poses = smooth.poses(t_ns, options.way._replace(parked=False))
+        poses = way_poses(t_ns, options.way._replace(parked=False))
     else:
         poses = _way(replace(options, parked=False), t_ns).poses
-    return scene.landmarks(poses, options.landmarks, chances["scene"], options.depths)
+    return sensors.landmarks(poses, options.landmarks, chances["scene"], options.depths)
 
 
 def _way(options: Options, t_ns: Times) -> Drive:
@@ -310,7 +304,7 @@ def _node_times(options: Options, more_s: float = 0.0) -> Times:
 
 
 def _readings(
-    options: Options, way: Drive, chances: _Chances
+    options: Options, way: Drive, chances: Chances
 ) -> tuple[Floats, Floats, Floats, Floats]:
     tau = np.diff(way.t_ns) * 1e-9
     count = len(way.t_ns)
@@ -326,7 +320,7 @@ def _readings(
     return v, w, bias_v, bias_w
 
 
-def _small_readings(options: Options, way: Drive, chances: _Chances) -> list[Reading]:
+def _small_readings(options: Options, way: Drive, chances: Chances) -> list[Reading]:
     v, w = way.v_B_mps, way.w_B_radps
     if not options.imu.is_there:
         held = (motion.held(x, options.twist_timing) for x in (v, w))
@@ -342,7 +336,7 @@ def _small_readings(options: Options, way: Drive, chances: _Chances) -> list[Rea
 
 
 def _observe(
-    options: Options, t_ns: Times, poses: Poses, points: Floats, chances: _Chances
+    options: Options, t_ns: Times, poses: Poses, points: Floats, chances: Chances
 ) -> tuple[Tracks, Flags]:
     tracker = sensors.SimulatedTracker(
         options.landmarks,
@@ -351,69 +345,41 @@ def _observe(
         options.keep_ids or options.known,
         chances["tracker"],
     )
-    eye = _Eye(options, t_ns, poses, points, chances)
+    mishaps = options.mishaps
+    camera, extrinsic = mishaps.true_camera(options.camera), mishaps.true_extrinsic(sensors.T_CB)
+    moves = (chances["moving"].random(len(points)) < mishaps.moving)[:, None]
+    ways = mishaps.ways(t_ns, poses, chances["moving_ways"])
+    drift = TrackDrift(len(points), mishaps.track_drift, chances["drift"])
+    tau_s = np.diff(t_ns, prepend=t_ns[:1]) * 1e-9
+    by_chance = (options.pixel_sigma_px, options.outliers, chances["pixels"], chances["outliers"])
     frames, ids, pixels, wrong = [], [], [], []
     for k in progress(range(len(t_ns)), "simulating", len(t_ns)):
-        seen = eye.look(k)
+        places = np.where(moves, points + ways[k], points)
+        R, p = poses.at(k)
+        seen = sensors.view(R, p, places, options.seen_m, camera, options.depths, extrinsic)
         landmarks = tracker.follow(seen.visible)
         id = tracker.ids(landmarks)
-        measured, bad = sensors.measure(
-            seen,
-            landmarks,
-            options.pixel_sigma_px,
-            options.outliers,
-            chances["pixels"],
-            chances["outliers"],
-        )
+        measured, bad = sensors.measure(seen, landmarks, *by_chance)
         frames.append(np.full(len(landmarks), k, np.intp))
         ids.append(id)
-        pixels.append(measured + eye.drift(k, landmarks, id))
+        pixels.append(measured + drift.wander(landmarks, id, float(tau_s[k])))
         wrong.append(bad)
     id = np.concatenate(ids)
     frame = np.concatenate(frames)
     order = np.lexsort((id, frame))
     tracks = Tracks.from_rows(len(poses.p), frame, id, np.concatenate(pixels))
-    tracks, whose = options.mishaps.freeze(t_ns, tracks)
+    tracks, whose = mishaps.freeze(t_ns, tracks)
     return tracks, np.concatenate(wrong)[order][whose]
-
-
-class _Eye:
-    """The true camera, and the landmarks' places over time."""
-
-    def __init__(
-        self, options: Options, t_ns: Times, poses: Poses, points: Floats, chances: _Chances
-    ) -> None:
-        mishaps = options.mishaps
-        self._options = options
-        self._camera = mishaps.true_camera(options.camera)
-        self._extrinsic = mishaps.true_extrinsic(scene.T_CB)
-        self._poses = poses
-        self._points = points
-        moves = chances["moving"].random(len(points)) < mishaps.moving
-        self._moves = moves[:, None]
-        self._ways = mishaps.ways(t_ns, poses, chances["moving_ways"])
-        self._drift = TrackDrift(len(points), mishaps.track_drift, chances["drift"])
-        self._tau_s = np.diff(t_ns, prepend=t_ns[:1]) * 1e-9
-
-    def look(self, k: int) -> scene.View:
-        options = self._options
-        points = np.where(self._moves, self._points + self._ways[k], self._points)
-        R, p = self._poses.at(k)
-        seen = (options.seen_m, self._camera, options.depths, self._extrinsic)
-        return scene.view(R, p, points, *seen)
-
-    def drift(self, k: int, landmarks: Indices, ids: NDArray[np.int64]) -> Floats:
-        return self._drift.wander(landmarks, ids, float(self._tau_s[k]))
 
 
 def _header(options: Options) -> Header:
     """Returns the HEADER; zero noise becomes no suggestion."""
     suggested = {name: getattr(options, name, -1.0) for name in vars(Noise())}
-    width, height = scene.IMAGE_PX
+    width, height = sensors.IMAGE_PX
     return Header(
         options.camera,
-        scene.T_CB.R,
-        scene.T_CB.p,
+        sensors.T_CB.R,
+        sensors.T_CB.p,
         body_axes=BodyAxes.FORWARD_LEFT_UP,
         twist_timing=options.twist_timing,
         image_width_px=width,

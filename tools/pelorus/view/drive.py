@@ -15,13 +15,12 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from pelorus.errors import PelorusError
-from pelorus.evaluate.evaluation import assess, by_imu, on_its_clock
+from pelorus.evaluate.evaluation import accuracy_of
 from pelorus.evaluate.frame_table import DIAGONAL
 from pelorus.evaluate.health import reasons
-from pelorus.io.trajectory import estimate_in, is_finite, truth_in
+from pelorus.io.trajectory import is_finite
 from pelorus.math.ellipsoids import Ellipsoids, of_landmarks
-from pelorus.program.distribution import pip_install
+from pelorus.program.extras import extra
 from pelorus.wire import schema
 from pelorus.wire.evidence import Evidence
 from pelorus.wire.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Stereo
@@ -31,14 +30,10 @@ COUNTS = ("observations", "matched", "used", "gated", "created", "active")  # of
 TWIST = tuple(f"{kind} {axis}" for kind in ("linear", "turn") for axis in "xyz")
 
 
-def extra(module: str) -> Any:
-    """Imports an optional library; raises PelorusError with the extra to install."""
-    try:
+def optional(module: str) -> Any:
+    """Imports a library of the extra `view`."""
+    with extra(module.partition(".")[0]):
         return import_module(module)
-    except ImportError as error:
-        raise PelorusError(
-            f"this needs {module.partition('.')[0]}, which is missing: {pip_install('view')}"
-        ) from error
 
 
 @dataclass
@@ -178,11 +173,7 @@ def show(messages: Sequence[Message], viewers: Sequence[Viewer]) -> None:
 
 
 def _truth(messages: Sequence[Message]) -> dict[int, Floats]:
-    found, truth = estimate_in(messages), truth_in(messages)
-    if found is None or truth is None:
-        return {}
-    on_clock = on_its_clock(messages, truth, found[0])
-    accuracy = assess(found[0], on_clock, found[1], upright=by_imu(messages))
+    accuracy = accuracy_of(messages)
     if accuracy is None:
         return {}
     return dict(zip(accuracy.t_ns.tolist(), accuracy.truth.p, strict=True))

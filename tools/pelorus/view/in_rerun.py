@@ -21,7 +21,7 @@ import numpy as np
 
 from pelorus.errors import PelorusError
 from pelorus.math.ellipsoids import Ellipsoids, of_pose
-from pelorus.view.drive import Moment, extra, quaternion
+from pelorus.view.drive import Moment, optional, quaternion
 from pelorus.wire.frames import Header, Landmark
 from pelorus.wire.layout import Floats
 
@@ -48,7 +48,7 @@ class InRerun:
         self, rrd: Path | None = None, connect: str | None = None, spawn: bool = False
     ) -> None:
         os.environ.setdefault("RUST_LOG", "error")  # its warnings are for programmers
-        self._rr = extra("rerun")
+        self._rr = optional("rerun")
         self._stream = self._rr.RecordingStream("pelorus")
         views = self._views()
         try:
@@ -75,7 +75,7 @@ class InRerun:
         self._shown_ns = 0
 
     def _views(self) -> Any:
-        rrb = extra("rerun.blueprint")
+        rrb = optional("rerun.blueprint")
         curves = [rrb.TimeSeriesView(origin=f"curves/{name}", name=name) for name in PANELS]
         pictures = rrb.Spatial2DView(origin="world/body/camera", name="points in the left picture")
         words = rrb.TextLogView(origin="health", name="health, and why")
