@@ -23,7 +23,7 @@ from pelorus.evaluate.evaluation import judge
 from pelorus.faults.named import judged_of
 from pelorus.io.trajectory import Trajectory, truth_in
 from pelorus.native.replay import Outputs, replay
-from pelorus.program.console import progress, step
+from pelorus.program.console import step
 from pelorus.wire import framing
 
 SPELLS_SHOWN = 12
@@ -101,8 +101,9 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     tuned = with_halves_alike(bench, with_shared_rows(bench, tuned))
     truth = truth_in(messages)
     step("the verdict")
-    both = progress((("before", given), ("after", tuned.settings)), "whole drive")
-    before, run = (_whole(program, recording, settings, folder, name) for name, settings in both)
+    before = run = _whole(program, recording, given, folder, "before")
+    if not bench.alike(given, tuned.settings):
+        run = _whole(program, recording, tuned.settings, folder, "after")
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
@@ -123,9 +124,13 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
         spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
     notes = of_search(tuned)
     changed = given, bench.header, tuned, bench.by_imu
+    verdict = verdict_of(run, known)
+    as_given: Verdict | None = verdict
+    if before is not run:
+        as_given = None if before is None else verdict_of(before, known)
     return Checked(
-        verdict_of(run, known),
-        None if before is None else verdict_of(before, known),
+        verdict,
+        as_given,
         notes,
         spells,
         changes.changes(*changed),

@@ -113,6 +113,11 @@ class Bench:
     def by_imu(self) -> bool:
         return len(self.examined.inertial.t_ns) > 0
 
+    def alike(self, one: Settings, other: Settings) -> bool:
+        """Returns whether replays with these settings are the same."""
+        timing = {"twist-timing": self.header.twist_timing.name.lower()}
+        return _plain(timing | dict(one)) == _plain(timing | dict(other))
+
     def holds(self, kind: Kind) -> bool:
         return any(message.kind == kind for message in self._messages)
 
