@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Makes all files of a release in build/release, with SHA256SUMS: wheels for five systems, the
 # source distribution, the two files of tools/amalgamate.py, and the firmware of the demo for every
-# board, with FIRMWARE.txt; a board that nobody has tried has `untried` in its files' names. It
+# board, with FIRMWARE.txt; a board that ran neither on hardware nor in an emulator has `untried` in its names. It
 # publishes nothing.
 #
 # usage: tools/release.sh

@@ -206,15 +206,15 @@ if [ $extent != quick ]; then
     replays=(-DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON)
     beside 'Python environment' ensure_python
     # Another compiler and less optimised: in one build, and by gcc, too, with --long.
-    clangs=("${replays[@]}" -DCMAKE_C_COMPILER="$clang")
     builds=(build build-clang build-portable)
+    level=2
     if [ $extent = long ]; then
+        level=3
         builds+=(build-o2)
         beside 'build: less optimised' by_one_job build_replays o2 "${replays[@]}"
-    else
-        clangs+=('-DCMAKE_C_FLAGS_RELEASE=-O2 -DNDEBUG')
     fi
-    beside 'build: clang' by_one_job build_replays clang "${clangs[@]}"
+    beside 'build: clang' by_one_job build_replays clang "${replays[@]}" -DCMAKE_C_COMPILER="$clang" \
+        "-DCMAKE_C_FLAGS_RELEASE=-O$level -DNDEBUG"
     joined
 fi
 ensure_python # there by now; if not, it says why and ends this
@@ -260,18 +260,20 @@ if [ $extent != quick ]; then
 
     # Of these two nothing is installed, and no library built that nothing links. Memory and undefined
     # behaviour are the same source in float64: its tests are built with --long, and one with other blocks always.
-    reals=()
-    [ $extent = long ] || reals=(-DPELORUS_TEST_REALS=f32 -DPELORUS_TESTS_ALONE=ON)
-    step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF "${reals[@]+"${reals[@]}"}" &&
+    # A folder keeps what it was told last, so each option is told either way.
+    reals=(-DPELORUS_TEST_REALS=f32 -DPELORUS_TESTS_ALONE=ON)
+    [ $extent = long ] && reals=('-DPELORUS_TEST_REALS=f32;f64' -DPELORUS_TESTS_ALONE=OFF)
+    step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF "${reals[@]}" &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
     # Another compiler, and without a fused multiply-add instruction. Where the golden tests and the units
     # compute the same bits, so would the long drives: they are built with --long alone, for their warnings. So
     # are the programs that nothing runs and libraries that check themselves, which gcc's two builds do.
-    kinds=()
-    [ $extent = long ] ||
-        kinds=('-DPELORUS_TEST_KINDS=unit;golden' -DPELORUS_TESTS_ALONE=ON -DPELORUS_TEST_ASSERTIONS=OFF)
+    kinds=('-DPELORUS_TEST_KINDS=unit;golden' -DPELORUS_TESTS_ALONE=ON -DPELORUS_TEST_ASSERTIONS=OFF)
+    [ $extent = long ] &&
+        kinds=('-DPELORUS_TEST_KINDS=unit;property;golden;regression;fuzz;campaign' -DPELORUS_TESTS_ALONE=OFF
+            -DPELORUS_TEST_ASSERTIONS=ON)
     step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_INSTALL=OFF \
-        -DPELORUS_TEST_BLOCKS=OFF "${kinds[@]+"${kinds[@]}"}" -DCMAKE_C_COMPILER="$clang" &&
+        -DPELORUS_TEST_BLOCKS=OFF "${kinds[@]}" -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
     step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py "${builds[@]}"
     if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then

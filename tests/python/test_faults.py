@@ -19,7 +19,9 @@ from drives import (
 from pelorus.faults import stale
 from pelorus.faults.mend import mend
 from pelorus.io.recording import Recording
+from pelorus.math import se3
 from pelorus.math.axes import FORWARD_LEFT_UP_IN_CAMERA, body_axes, name, turns
+from pelorus.math.se3 import Poses
 from pelorus.wire.frames import BodyAxes, TwistTiming
 from pelorus.wire.layout import Floats
 from pelorus_course import timing
@@ -161,13 +163,26 @@ def test_all_faults_at_once_are_mended_in_turn() -> None:
     assert repeated > 0
 
 
-def test_an_extrinsic_that_does_not_fit_even_then_is_left_as_given_and_its_fault_named() -> None:
-    """Rates that are mirrored: no turn of the body explains them."""
+def test_axes_that_no_turn_explains_are_left_as_given_and_named() -> None:
     recording = clean(3)
     broken = replace(recording, w_B_radps=recording.w_B_radps * [1, 1, -1])
     mended = mend(broken)
     assert same_extrinsic(mended.recording, broken)
-    assert any(finding.found for finding in mended.told), mended.told
+    assert "axes" in [finding.subject for finding in mended.told if finding.found]
+
+
+def test_an_extrinsic_that_does_not_fit_even_then_is_left_as_given_and_that_is_said() -> None:
+    """Turned axes, and a camera that is pitched besides."""
+    turned = with_turned_axes(clean(3))
+    pitch = se3.exp(np.zeros((1, 3)), np.radians([[12.0, 0.0, 0.0]])).R[0]
+    broken = turned.with_extrinsic(Poses(pitch @ turned.T_CB.R, turned.T_CB.p))
+    mended = mend(broken)
+    assert mended.recording is broken
+    tried = mended.changes[-1]
+    assert tried.subject == "axes"
+    assert not tried.found
+    assert tried.action.startswith("left as given: even then it would not fit (")
+    assert "axes" in [finding.subject for finding in mended.told if finding.found]
 
 
 @pytest.mark.parametrize("given", [TwistTiming.START, TwistTiming.END])

@@ -11,7 +11,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from draws import draws
 from pelorus.simulate.simulate import Options, simulate
 from replay_drive import run
 
@@ -25,7 +24,7 @@ def weak(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("program", draws(["pelorus-replay", "pelorus-replay-f64"]))
+@pytest.mark.parametrize("program", ["pelorus-replay", "pelorus-replay-f64"])
 def test_the_gate_turns_away_little_more_than_is_due(weak: Path, program: str) -> None:
     result = run(weak, "--slots", "60", "--bias", "on", "--json", program=program)
     summary = result.summary

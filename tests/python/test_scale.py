@@ -16,14 +16,16 @@ from draws import draws, long_run
 from everyday import drawn
 from everyday import drive as everyday_drive
 from pelorus.check import calibration, clock, search, tuning, verdict
-from pelorus.check.contents import scaled
+from pelorus.check.contents import scaled, shifted
 from pelorus.check.known import known_of
 from pelorus.check.options import Settings
 from pelorus.check.outcome import NOTHING, OFFSET, SCALE, Bench
 from pelorus.wire import framing
-from pelorus.wire.frames import Twist
+from pelorus.wire.frames import Kind, Twist, TwistTiming
 from replay_drive import BIN, drive, header
+from report_runs import built_programs
 
+AS_GIVEN = header().twist_timing.name.lower()
 TRUE = {"pixel-sigma": "0.5", "velocity-sigma": "0.05", "gyro-sigma": "0.005"}
 
 
@@ -83,6 +85,7 @@ FOUND = search.BestFound({"pixel": 0.5, "velocity": 0.1, "gyro": 0.01}, NOTHING)
 def still_bench(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Returns a bench for the twists' search, of which nothing but the clock is left."""
     monkeypatch.setattr(clock, "seconds", lambda _: 0.02)
+    monkeypatch.setattr(clock, "is_finer", lambda _: True)
     monkeypatch.setattr(tuning, "search_noises", lambda *_: FOUND)
     monkeypatch.setattr(tuning, "track_noise", lambda _: SimpleNamespace(drifts=False))
     monkeypatch.setattr(tuning, "difference_of_a_reading", lambda *_: None)
@@ -115,9 +118,10 @@ def test_two_clocks_are_no_timing(
         (0.0, 0.003, 0.05, 0.0),  # a setting that is wrong
         (0.01, 0.003, 0.0, 0.0),  # chance
         (0.06, 0.02, 0.0, None),  # too rough: all offsets are tried
+        (0.3, 0.001, 0.0, None),  # so large that none near it is tried
         (float("nan"), float("inf"), 0.0, None),
     ],
-    ids=["late", "given wrong", "chance", "rough", "untold"],
+    ids=["late", "given wrong", "chance", "rough", "large", "untold"],
 )
 def test_the_search_for_the_clock_begins_where_the_fit_finds_it(
     monkeypatch: pytest.MonkeyPatch,
@@ -150,6 +154,51 @@ def test_the_search_for_the_clock_begins_where_the_fit_finds_it(
     else:
         assert asked == [fit_s]
         assert rough == [begins]
+
+
+def test_the_fit_tells_no_clock_where_it_reads_the_twists_otherwise_than_replays(
+    monkeypatch: pytest.MonkeyPatch, still_bench: Any
+) -> None:
+    """With one twist a frame, or another timing than the HEADER's, the offset is a timing's."""
+    asked: list[float | None] = []
+
+    def of_twists(_: Bench, _settings: Settings, about_s: float | None = None) -> clock.Offset:
+        asked.append(about_s)
+        return clock.UNTOLD
+
+    monkeypatch.setattr(clock, "of_twists", of_twists)
+    still_bench.run_all = lambda many, _: [NOTHING for _ in many]
+    agreed = cast(
+        Any, SimpleNamespace(is_known=True, offset_s=0.06, offset_sigma_s=0.001, scale=1.0,
+                             scale_sigma=0.01),
+    )  # fmt: skip
+    timing = next(name for name in ("start", "end") if name != AS_GIVEN)
+    tuning.tune(still_bench, {"twist-timing": timing}, agreed)
+    monkeypatch.setattr(clock, "is_finer", lambda _: False)
+    tuning.tune(still_bench, {}, agreed)
+    assert asked == [None] * 4
+
+
+@pytest.mark.parametrize("given", ["start", "end"])
+def test_a_wrong_timing_of_one_twist_a_frame_is_found(tmp_path: Path, given: str) -> None:
+    path = simulated(tmp_path, "--twist-rate", "10")
+    messages = framing.messages_of(path)
+    told = replace(framing.header_of_messages(messages), twist_timing=TwistTiming[given.upper()])
+    framing.write_file(path, [told, *messages[1:]])
+    bench = Bench(built_programs().float32, path, tmp_path)
+    agreed = known_of(framing.messages_of(path)).judged.agreed
+    tuned = tuning.tune(bench, TRUE, agreed)
+    assert tuned.settings.get("twist-timing", given) == "start", tuned.said
+
+
+def test_a_clock_beyond_what_is_tried_ends_no_check(tmp_path: Path) -> None:
+    path = simulated(tmp_path)
+    messages = [m for m in framing.messages_of(path) if m.kind not in (Kind.END, Kind.TRUTH)]
+    framing.write_file(path, shifted(messages, 300_000_000))
+    known = known_of(framing.messages_of(path))
+    assert "clock" in [fault.name for fault in known.faults]
+    bench = Bench(built_programs().float32, path, tmp_path)
+    assert tuning.tune(bench, TRUE, known.judged.agreed).settings
 
 
 def test_velocities_of_another_scale_keep_their_noise_and_their_turns() -> None:

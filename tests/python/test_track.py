@@ -34,7 +34,7 @@ from pelorus.tracking import images
 from pelorus.wire import framing
 from pelorus.wire.frames import Camera, TwistTiming
 from pelorus_course import matlab
-from replay_drive import BIN, judged
+from replay_drive import BIN, ROOT, judged
 
 Monkeypatch = pytest.MonkeyPatch
 Frames = list[tuple[images.Gray, images.Gray]]
@@ -351,7 +351,7 @@ def test_calls_that_make_no_sense_are_refused_with_what_would_be_right(
 MEASURED = 13  # KITTI's truth and twists of the frames before are interpolated, and off
 
 
-TRACK_CONF = BIN.parents[1] / "tools" / "config" / "track.conf"
+TRACK_CONF = ROOT / "tools" / "config" / "track.conf"
 
 
 def demand_replay() -> None:

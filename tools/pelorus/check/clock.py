@@ -56,12 +56,15 @@ UNTOLD = Offset(0.0, float("inf"))
 
 
 def of_fit(agreed: Agreement | None) -> Offset:
-    """Returns the offset by the fit over pairs of frames; unknown where that tells none.
+    """Returns the offset by the fit over pairs of frames; unknown where that tells none, or one
+    that is too large to be tried.
 
     Replays then tell it better by a third: to a filter a point is known from all frames that saw
     it, to a pair from two.
     """
     if agreed is None or not np.isfinite(agreed.offset_sigma_s):
+        return UNTOLD
+    if abs(agreed.offset_s) > OFFSET_MOST_S:
         return UNTOLD
     return Offset(agreed.offset_s, agreed.offset_sigma_s)
 
@@ -71,6 +74,12 @@ def surer(one: Offset, other: Offset) -> Offset:
     return one if one.sigma_s < other.sigma_s else other
 
 
+def is_finer(bench: Bench) -> bool:
+    """Returns whether there are several twists a frame, without which they tell no offset."""
+    period_s = seconds(bench.examined.twist_t_ns)
+    return seconds(bench.examined.frame_t_ns) >= 2 * period_s > 0
+
+
 def of_twists(bench: Bench, settings: Settings, about_s: float | None = None) -> Offset:
     """Estimates the offset by twists in steps of whole readings; unknown with one reading a frame.
 
@@ -78,9 +87,9 @@ def of_twists(bench: Bench, settings: Settings, about_s: float | None = None) ->
     noise alone. Where the offset is known roughly (`about_s`), those farther off are tried only if
     the best is not near it.
     """
-    period_s = seconds(bench.examined.twist_t_ns)
-    if seconds(bench.examined.frame_t_ns) < 2 * period_s or not period_s > 0:
+    if not is_finer(bench):
         return UNTOLD
+    period_s = seconds(bench.examined.twist_t_ns)
     step_s = period_s * max(round(COARSE_S / period_s), 1)
     most = int(OFFSET_MOST_S / step_s + 1e-6)
     reach = max(int(NEAR_S / step_s + 1e-6), FEWEST - 1) + 1  # a parabola about a neighbour, too

@@ -70,7 +70,7 @@ def _tune(bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bo
         return Tuned(settings, before, bench.run(settings), noise, [words])
     rough = fixed | WIDE | slots.fewer(given)
     values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)
-    offset = clock.of_fit(agreed) if one_clock else clock.UNTOLD
+    offset = _by_fit(bench, given, agreed) if one_clock else clock.UNTOLD
     if one_clock and not offset.is_near:
         offset = clock.of_twists(bench, rough | written(values, TWIST))
     if offset.gain_over(float(rough[OFFSET])) > PAYS:  # a wrong clock is no noise: it comes first
@@ -92,6 +92,18 @@ def _tune(bench: Bench, given: Settings, agreed: Agreement | None, one_clock: bo
     lasting = [calibration.scale_words(off)] if off else []
     outcome = found.outcome
     return Tuned(settings, before, outcome, noise, said, offset_s, [of_clock], lasting=lasting)
+
+
+def _by_fit(bench: Bench, given: Settings, agreed: Agreement | None) -> clock.Offset:
+    """Returns the fit's offset where replays could tell one, and read the twists as the fit did.
+
+    The fit goes by the HEADER's timing. With one twist a frame another timing is another offset,
+    and a wrong one would be made up for before the timings compete.
+    """
+    timing = bench.header.twist_timing.name.lower()
+    if not clock.is_finer(bench) or given.get("twist-timing", timing) != timing:
+        return clock.UNTOLD
+    return clock.of_fit(agreed)
 
 
 def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[str, float]:

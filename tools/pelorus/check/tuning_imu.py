@@ -4,7 +4,7 @@
 A wrong clock looks like noise, and small noise hides the valley in which the clock's offset lies: a
 filter that trusts its IMU takes frames of another time for a contradiction and widens its
 covariance. So the noises come first, as large as the wrong clock makes them, then the clock, and
-then both again.
+then both again; where the fit over pairs of frames tells the clock, that comes first.
 """
 
 from __future__ import annotations

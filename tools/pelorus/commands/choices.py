@@ -22,7 +22,7 @@ LOG: Path = typer.Argument(
     "first.",
 )
 CONFIG = typer.Option(
-    None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
+    None, metavar="FILE", help="Settings of a replay, as pelorus-replay takes them."
 )
 SETTINGS = typer.Option(
     [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."

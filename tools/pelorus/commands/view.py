@@ -14,7 +14,6 @@ from pelorus.commands.choices import CONFIG, LOG, PROGRAMS, SETTINGS, replay_opt
 from pelorus.errors import PelorusError, whole, write_text
 from pelorus.native.replay import whole_log_of
 from pelorus.program.console import out
-from pelorus.view.in_foxglove import layout
 
 if TYPE_CHECKING:
     from pelorus.view.drive import Viewer
@@ -57,6 +56,8 @@ def view(
         if path.exists() and source.exists() and path.samefile(source):
             raise PelorusError(f"{path}: is the log itself; another name is expected")
     if layout_file is not None:
+        from pelorus.view.in_foxglove import layout  # noqa: PLC0415 - it loads scipy
+
         write_text(layout_file, layout())
         files.append(layout_file)
     from pelorus.view.drive import show  # noqa: PLC0415 - scipy loads slowly

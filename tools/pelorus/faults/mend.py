@@ -40,17 +40,15 @@ class Mended:
 def mend(given: Recording) -> Mended:
     """Mends stale tracks, and an extrinsic of other axes or of another convention.
 
-    Tracks come first, for all else measures with them. What is changed is kept only if the mended
-    recording has no fault that stops.
+    Tracks come first, for all else measures with them; they stay split unless then no id lasts. An
+    extrinsic is changed only if the recording then has no fault that stops.
     """
     recording, of_tracks = stale.mend(given)
     found = judged(recording)
     if of_tracks.found and found.faults and found.faults[0].name == NOTHING_LASTS:
         # frozen pictures, not single stale tracks
-        words = f"left as given: even then it would not fit ({found.faults[0].words})"
-        of_tracks = replace(of_tracks, is_conclusive=False, found=False, action=words)
+        of_tracks = _left(of_tracks, found.faults[0])
         recording, found = given, judged(given)
-    changes = [of_tracks]
     fits, now, remedies = recording, found, list[Finding]()
     while len(remedies) < REMEDIES:
         fault = next((fault for fault in now.faults if fault.extrinsic is not None), None)
@@ -60,14 +58,23 @@ def mend(given: Recording) -> Mended:
         remedies.append(Finding(fault.name, True, fault.sentence, action))
         fits = fits.with_extrinsic(fault.extrinsic)
         now = judged(fits)
-    if remedies and not any(fault.stops for fault in now.faults):
-        recording, found, changes = fits, now, [*changes, *remedies]
-    return Mended(recording, changes, _told(found))
+    wrong = [fault for fault in now.faults if fault.stops]
+    if remedies and wrong:
+        remedies = [_left(finding, wrong[0]) for finding in remedies]
+    elif remedies:
+        recording, found = fits, now
+    return Mended(recording, [of_tracks, *remedies], _told(found))
 
 
 def findings_of(recording: Recording) -> list[Finding]:
     """Returns the faults of a recording that is not to be changed, and what it cannot show."""
     return _told(judged(recording))
+
+
+def _left(finding: Finding, because: Fault) -> Finding:
+    """Returns the finding of what would not fit even if it were mended."""
+    action = f"left as given: even then it would not fit ({because.words})"
+    return replace(finding, is_conclusive=False, found=False, action=action)
 
 
 def _changed(given: Poses, other: Poses) -> str:

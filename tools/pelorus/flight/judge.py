@@ -232,7 +232,7 @@ def of_this_version(build: Config) -> bool:
     return build.build_fingerprint == fingerprint(__version__, ARITHMETIC, build)
 
 
-# --- one part ------------------------------------------------------------------------------------
+# --- one part -------------------------------------------------------------------------------------
 
 
 def _judge(part: Part, desk: Desk, state: Path | None) -> Judgement:

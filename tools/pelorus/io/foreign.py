@@ -52,7 +52,6 @@ class ForeignFileError(PelorusError):
 
     def __init__(self, path: Path, what: str, *, at: str = "") -> None:
         self.path, self.at = path, at
-        self.wrong, _, self.expected = what.partition("; ")
         super().__init__(f"{path}: {at}: {what}" if at else f"{path}: {what}")
 
 
