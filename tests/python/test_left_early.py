@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from converted import Run
 from pelorus.commands import report as report_command
-from pelorus.report import page
+from pelorus.report import answers
 from replay_drive import Record, drive
 from report_runs import built_programs, recorded
 
@@ -77,7 +77,7 @@ def test_a_report_that_is_interrupted_leaves_nothing(
         if step == "replaying":
             patch.setattr(report_command, "carry_out", interrupted)
         else:
-            patch.setattr(page, "write", interrupted)
+            patch.setattr(answers, "write", interrupted)
         assert pelorus("report", source, "--out", folder, status=None).status != 0
     assert [path.name for path in tmp_path.iterdir()] == [source.name]
 
@@ -91,7 +91,7 @@ def test_a_report_that_is_interrupted_leaves_the_earlier_one(
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert folder / "runs" / "yours.plr" in before
     with monkeypatch.context() as patch:
-        patch.setattr(page, "write", interrupted)
+        patch.setattr(answers, "write", interrupted)
         assert (
             pelorus("report", source, "--out", folder, "--set", "bias=off", status=None).status != 0
         )
