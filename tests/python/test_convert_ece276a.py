@@ -59,7 +59,7 @@ def test_everything_of_an_npz_arrives(tmp_path: Path, pelorus: Run, edition: int
     drive = clean(**SHORT)
     source, target = save_npz(tmp_path / "drive.npz", drive, edition), tmp_path / "drive.plr"
     said = pelorus("convert", "ece276a", source, target)
-    for subject in ("stale tracks", "camera and body"):
+    for subject in ("stale tracks", "twist timing"):
         assert f"{subject}: good" in said.out
     assert "twist noise: cannot tell" in said.out, "61 frames are too few"
     header = messages_of(target, Header)[0]
