@@ -35,9 +35,10 @@ static struct {
     double light;               /* grey levels over those of EXPOSURE_FIRST's */
     /* of exposure, left and right: of this picture, ..., as written */
     unsigned rows[2][WRITTEN + 1];
-    unsigned writes;
+    unsigned writes, answered[2];
     unsigned deaf[2]; /* the left and right camera do not take the next so many */
     unsigned dull[2]; /* before them they take so many */
+    unsigned mute[2]; /* and of these they do not answer so many, but take them */
     unsigned apart;   /* pictures whose exposures differed, and their times */
     uint64_t apart_ns[APART];
 } world;
@@ -140,6 +141,7 @@ const char *imu_start(readings *queue_of_loop) {
 const char *camera_start(capture *into, bool pattern, uint16_t exposure_rows) {
     for (unsigned i = 0; i <= WRITTEN; i++)
         world.rows[0][i] = world.rows[1][i] = exposure_rows;
+    world.answered[0] = world.answered[1] = exposure_rows;
     world.pairs = into;
     world.pattern = pattern;
     world.running = world.dead_camera == NULL;
@@ -167,8 +169,7 @@ uint32_t camera_triggered(void) {
 /* A change comes while the last picture of the left camera was exposed as it was last told: only then does its grey
  * level tell something. */
 bool camera_expose(camera_side side, uint16_t rows) {
-    const bool alike_before = world.rows[0][WRITTEN] == world.rows[1][WRITTEN];
-    if (alike_before && world.rows[0][WRITTEN] != rows)
+    if (world.answered[0] == world.answered[1] && world.rows[0][WRITTEN] != rows)
         TEST_ASSERT_EQUAL_UINT(world.rows[0][WRITTEN], world.rows[0][0]);
     world.writes++;
     const bool takes_it = world.deaf[side] == 0 || world.dull[side] > 0;
@@ -179,6 +180,11 @@ bool camera_expose(camera_side side, uint16_t rows) {
     else if (!takes_it)
         world.deaf[side]--;
     play(world.now_ns + world.write_ns);
+    if (world.mute[side] > 0) {
+        world.mute[side]--;
+        return false;
+    }
+    world.answered[side] = takes_it ? rows : world.answered[side];
     return takes_it;
 }
 
@@ -435,6 +441,22 @@ static void test_a_camera_that_never_takes_an_exposure_again_is_told_once_and_pa
         TEST_ASSERT_EQUAL_UINT(0, run_for(12000 * MS));
         assert_brighter();
     }
+}
+
+/* The light is as before when the camera that has it all the same is told again. */
+static void test_a_camera_that_took_what_it_did_not_answer_is_told_what_both_have(void) {
+    TEST_ASSERT_NULL(sensors_start());
+    begin_session();
+    run_for(500 * MS);
+    world.light = 0.4;
+    world.mute[1] = 1;
+    while (world.mute[1] > 0)
+        run_for(MS);
+    TEST_ASSERT_TRUE(world.rows[0][WRITTEN] != world.rows[1][WRITTEN]);
+    world.light = 0.75;
+    run_for(500 * MS);
+    TEST_ASSERT_EQUAL_UINT(EXPOSURE_FIRST, world.rows[0][0]);
+    TEST_ASSERT_EQUAL_UINT(EXPOSURE_FIRST, world.rows[1][0]);
 }
 
 /* The right camera takes none, and the left one does not take the old one back. */
