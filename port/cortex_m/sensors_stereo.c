@@ -24,6 +24,7 @@ enum {
     PROBE = 16,           /* of each so many rows and columns one pixel tells the exposure */
     SETTLES = 2,          /* pictures that may still have the exposure before */
     REFUSALS = 5,         /* in a row, after which people are told of a camera */
+    MISSES = 4, /* pairs that an exposure waits, as cameras do not rest when the loop asks */
     READINGS_AT_ONCE = READINGS
 };
 
@@ -53,7 +54,8 @@ static struct {
     uint64_t since_ns;           /* pictures before it tell nothing of `rows` */
     unsigned settling;           /* pictures since then that may still have the exposure before */
     bool apart; /* one camera may be exposed otherwise than the other: the pair is left out */
-    uint32_t left_out; /* such pairs, for a debugger */
+    uint32_t left_out; /* such pairs, and those that a write needed; for a debugger */
+    unsigned misses;   /* pairs in a row that were looked at while a write waited */
     uint32_t refusals; /* attempts in a row that a camera did not take */
     uint64_t again_ns; /* no attempt before it */
 } exposure;
@@ -226,12 +228,16 @@ static const char *count_refusals(camera_side deaf) {
                  "that they have, and pairs that are not exposed alike are left out";
 }
 
-/* Between two pictures, so that both cameras have it from the same one on. A camera that did not take the last one
- * is told again even if the light asks for nothing: it may have taken what it did not answer. */
+/* A camera that did not take the last one is told again even if the light asks for nothing: it may have taken what it
+ * did not answer. */
+static bool is_due(void) {
+    return exposure.refusals > 0 ? moments_now_ns() >= exposure.again_ns
+                                 : exposure.rows[CAMERA_LEFT] != exposure.wanted;
+}
+
+/* Between two pictures, so that both cameras have it from the same one on. */
 static const char *expose(void) {
-    const bool due = exposure.refusals > 0 ? moments_now_ns() >= exposure.again_ns
-                                           : exposure.rows[CAMERA_LEFT] != exposure.wanted;
-    if (!due || !camera_rests()) {
+    if (!is_due() || !camera_rests()) {
         return NULL;
     }
     const uint32_t triggered = camera_triggered();
@@ -244,6 +250,17 @@ static const char *expose(void) {
         exposure.settling = SETTLES;
     }
     return count_refusals(deaf);
+}
+
+/* Looks that take two periods may leave the loop at the same moment of a picture each time, never in a rest. Whether
+ * this pair is left out, so that the loop idles until the next one. */
+static bool write_needs_time(void) {
+    exposure.misses = is_due() ? exposure.misses + 1 : 0;
+    if (exposure.misses <= MISSES) {
+        return false;
+    }
+    exposure.misses = 0;
+    return true;
 }
 
 static void look(plr_session *session, const capture_pair *there) {
@@ -264,7 +281,7 @@ const char *sensors_step(plr_session *session) {
     }
     const bool apart = exposure.apart;
     const char *trouble = expose(); /* now, for a look takes long */
-    if (there != NULL && apart) {
+    if (there != NULL && (apart || write_needs_time())) {
         ++exposure.left_out;
     } else if (there != NULL) {
         look(session, there);

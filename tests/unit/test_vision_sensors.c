@@ -368,20 +368,21 @@ static void test_a_change_of_light_is_followed_by_one_change_of_exposure_that_is
     TEST_ASSERT_EQUAL_UINT(2, world.writes); /* one of each camera */
 }
 
-/* A pair is ready some 15 ms after its trigger, and the loop idles again when a look of it ends. */
+/* A pair is ready some 15 ms after its trigger, and the loop idles again when a look of it ends. Looks of two periods
+ * leave each second picture out, and end in it. */
 static void test_the_exposure_is_written_however_long_a_look_takes(void) {
-    for (uint64_t look_ms = 0; look_ms <= 90; look_ms += 5) {
+    for (uint64_t look_ms = 0; look_ms <= 110; look_ms += 2) {
         setUp();
         world.look_ns = look_ms * MS;
         TEST_ASSERT_NULL(sensors_start());
         begin_session();
         run_for(500 * MS);
         world.light = 0.4;
-        run_for(1000 * MS);
+        run_for(1500 * MS);
         assert_brighter();
         TEST_ASSERT_EQUAL_UINT(2, world.writes);
         TEST_ASSERT_EQUAL_UINT(0, world.apart);
-        TEST_ASSERT_EQUAL_UINT32(0, exposure.left_out);
+        TEST_ASSERT_TRUE(exposure.left_out <= (look_ms > 90));
     }
 }
 
