@@ -18,12 +18,16 @@ uint64_t moments_now_ns(void);
 const char *camera_start(capture *pairs, bool pattern, uint16_t exposure_rows);
 void camera_stop(void);
 
-/* Whether no picture is exposed or read out, and none begins before camera_expose would be through. */
+/* Whether no picture is exposed or read out, and none begins before camera_expose would be through three times. */
 bool camera_rests(void);
 
-/* Rows of exposure from now on, of one camera after the other: call it while they rest. False: one of them did not
- * take it, or a picture began between; pictures may then be exposed differently until a call that succeeds. */
-bool camera_expose(uint16_t rows);
+/* Pictures so far. Where it is another after some calls of camera_expose than before them, one began between. */
+uint32_t camera_triggered(void);
+
+typedef enum camera_side { CAMERA_LEFT, CAMERA_RIGHT, CAMERA_SIDES } camera_side;
+
+/* Rows of exposure of one camera, from its next picture on: call it while they rest. False: it did not take it. */
+bool camera_expose(camera_side side, uint16_t rows);
 
 /* Starts readings into a queue. What is wrong, or NULL. */
 const char *imu_start(readings *queue);

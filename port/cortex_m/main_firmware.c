@@ -50,9 +50,8 @@ static void announce(void) {
     (void)plr_writer_put(&session.writer, &message);
 }
 
-/* Cameras and IMU of the board's own: what is wrong with them people are told. */
-static void start_sensors(void) {
-    const char *trouble = sensors_start();
+/* Cameras and IMU of the board's own: what is wrong with them, or NULL, people are told. */
+static void tell_trouble(const char *trouble) {
     if (trouble != NULL) {
         message.kind = PLR_KIND_TEXT;
         message.as.text.severity = PLR_SEVERITY_ERROR;
@@ -87,9 +86,9 @@ int main(void) {
         return 1; /* startup resets the board: only a broken build comes here */
     }
     announce();
-    start_sensors();
+    tell_trouble(sensors_start());
     for (;;) {
         (void)plr_session_step(&session);
-        sensors_step(&session);
+        tell_trouble(sensors_step(&session));
     }
 }

@@ -11,7 +11,7 @@ extern const uint32_t sensors_output;
 /* Starts them, in bounded time, with interrupts on. Returns what is wrong, in words for people, or NULL. */
 const char *sensors_start(void);
 
-/* Between two steps of the session: hands over what they saw. */
-void sensors_step(plr_session *session);
+/* Between two steps of the session: hands over what they saw. Returns what went wrong, told once, or NULL. */
+const char *sensors_step(plr_session *session);
 
 #endif

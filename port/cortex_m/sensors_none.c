@@ -7,6 +7,7 @@ const char *sensors_start(void) {
     return 0;
 }
 
-void sensors_step(plr_session *session) {
+const char *sensors_step(plr_session *session) {
     (void)session;
+    return 0;
 }

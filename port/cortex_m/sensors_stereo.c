@@ -23,6 +23,8 @@ enum {
     TRIES = 3,            /* at a start in step */
     PROBE = 16,           /* of each so many rows and columns one pixel tells the exposure */
     SETTLES = 2,          /* pictures that may still have the exposure before */
+    REFUSALS = 5,         /* in a row, after which people are told of a camera */
+    MISSES = 4, /* pairs that an exposure waits, as cameras do not rest when the loop asks */
     READINGS_AT_ONCE = READINGS
 };
 
@@ -31,8 +33,10 @@ enum {
 #define CAMERA_LATE_NS UINT64_C(30000000)
 /* Within which some pattern must come: a picture does every 50 ms. */
 #define PATTERN_NS UINT64_C(500000000)
-/* After which a camera that did not take its exposure is told again. */
-#define TELL_AGAIN_NS UINT64_C(100000000)
+/* After which a camera that did not take its exposure is told again: at first, and once people have been told. A bus
+ * that hangs costs the pairs of an attempt. */
+#define TELL_AGAIN_NS       UINT64_C(100000000)
+#define TELL_AGAIN_LATER_NS UINT64_C(10000000000)
 
 const uint32_t sensors_output = PLR_OUTPUT_ECHO;
 
@@ -43,14 +47,17 @@ static capture pairs;
 static readings queue;
 static bool started;
 
-/* Of both cameras, in rows. */
+/* In rows. */
 static struct {
-    uint16_t rows;     /* 0: one of them may have another */
-    uint16_t wanted;   /* by the light */
-    uint64_t since_ns; /* pictures before it tell nothing of `rows` */
-    unsigned settling; /* pictures since then that may still have the exposure before */
+    uint16_t rows[CAMERA_SIDES]; /* what each camera took last */
+    uint16_t wanted;             /* of both, by the light */
+    uint64_t since_ns;           /* pictures before it tell nothing of `rows` */
+    unsigned settling;           /* pictures since then that may still have the exposure before */
     bool apart; /* one camera may be exposed otherwise than the other: the pair is left out */
-    uint32_t left_out; /* such pairs, for a debugger */
+    uint32_t left_out; /* such pairs, and those that a write needed; for a debugger */
+    unsigned misses;   /* pairs in a row that were looked at while a write waited */
+    uint32_t refusals; /* attempts in a row that a camera did not take */
+    uint64_t again_ns; /* no attempt before it */
 } exposure;
 
 plr_eyes *firmware_eyes(void) {
@@ -117,7 +124,8 @@ const char *sensors_start(void) {
     if (trouble == NULL) {
         trouble = camera_start(&pairs, false, EXPOSURE_FIRST);
         memset(&exposure, 0, sizeof exposure);
-        exposure.rows = exposure.wanted = EXPOSURE_FIRST;
+        exposure.rows[CAMERA_LEFT] = exposure.rows[CAMERA_RIGHT] = EXPOSURE_FIRST;
+        exposure.wanted = EXPOSURE_FIRST;
     }
     started = trouble == NULL;
     return trouble;
@@ -158,9 +166,13 @@ static uint32_t mean_grey(const uint8_t *pixels) {
     return sum / count;
 }
 
+static bool alike(void) {
+    return exposure.rows[CAMERA_LEFT] == exposure.rows[CAMERA_RIGHT];
+}
+
 /* What the light asks for; after a change not before pictures come that were exposed with it. */
 static void follow_light(const capture_pair *pair) {
-    if (exposure.rows != exposure.wanted || pair->t_ns < exposure.since_ns) {
+    if (!alike() || pair->t_ns < exposure.since_ns) {
         return;
     }
     if (exposure.settling > 0) {
@@ -168,20 +180,87 @@ static void follow_light(const capture_pair *pair) {
         return;
     }
     exposure.apart = false;
-    exposure.wanted = exposure_next(exposure.rows, mean_grey(pair->left), EXPOSURE_MOST);
+    exposure.wanted =
+        exposure_next(exposure.rows[CAMERA_LEFT], mean_grey(pair->left), EXPOSURE_MOST);
+}
+
+static bool takes(camera_side side, uint16_t rows) {
+    const bool taken = camera_expose(side, rows);
+    exposure.rows[side] = taken ? rows : exposure.rows[side];
+    return taken;
+}
+
+/* What one camera does not take the other gives back, so that both go on with what that one has. Returns the camera
+ * that did not take it, or CAMERA_SIDES. */
+static camera_side tell_both(void) {
+    camera_side deaf = CAMERA_SIDES;
+    if (!takes(CAMERA_LEFT, exposure.wanted)) {
+        deaf = CAMERA_LEFT;
+    } else if (!takes(CAMERA_RIGHT, exposure.wanted)) {
+        deaf = CAMERA_RIGHT;
+    }
+    if (deaf != CAMERA_SIDES) {
+        exposure.wanted = exposure.rows[deaf];
+        if (!alike()) {
+            (void)takes(deaf == CAMERA_LEFT ? CAMERA_RIGHT : CAMERA_LEFT, exposure.wanted);
+        }
+    }
+    return deaf;
+}
+
+/* Returns what people are told of it, once. */
+static const char *count_refusals(camera_side deaf) {
+    if (deaf == CAMERA_SIDES) {
+        exposure.refusals = 0;
+        return NULL;
+    }
+    ++exposure.refusals;
+    exposure.again_ns =
+        moments_now_ns() +
+        (alike() && exposure.refusals >= REFUSALS ? TELL_AGAIN_LATER_NS : TELL_AGAIN_NS);
+    if (exposure.refusals != REFUSALS) {
+        return NULL;
+    }
+    return deaf == CAMERA_LEFT
+               ? "the left camera takes no exposure: look at its two-wire bus; both keep the one "
+                 "that they have, and pairs that are not exposed alike are left out"
+               : "the right camera takes no exposure: look at its two-wire bus; both keep the one "
+                 "that they have, and pairs that are not exposed alike are left out";
+}
+
+/* A camera that did not take the last one is told again even if the light asks for nothing: it may have taken what it
+ * did not answer. */
+static bool is_due(void) {
+    return exposure.refusals > 0 ? moments_now_ns() >= exposure.again_ns
+                                 : exposure.rows[CAMERA_LEFT] != exposure.wanted;
 }
 
 /* Between two pictures, so that both cameras have it from the same one on. */
-static void expose(void) {
-    const uint64_t now_ns = moments_now_ns();
-    if (exposure.rows == exposure.wanted || !camera_rests() ||
-        (exposure.rows == 0 && now_ns - exposure.since_ns < TELL_AGAIN_NS)) {
-        return;
+static const char *expose(void) {
+    if (!is_due() || !camera_rests()) {
+        return NULL;
     }
-    exposure.rows = camera_expose(exposure.wanted) ? exposure.wanted : 0;
-    exposure.apart = exposure.apart || exposure.rows == 0;
-    exposure.since_ns = moments_now_ns();
-    exposure.settling = SETTLES;
+    const uint32_t triggered = camera_triggered();
+    const uint16_t left = exposure.rows[CAMERA_LEFT], right = exposure.rows[CAMERA_RIGHT];
+    const camera_side deaf = tell_both();
+    const bool between = camera_triggered() != triggered;
+    exposure.apart = exposure.apart || between || !alike();
+    if (between || exposure.rows[CAMERA_LEFT] != left || exposure.rows[CAMERA_RIGHT] != right) {
+        exposure.since_ns = moments_now_ns();
+        exposure.settling = SETTLES;
+    }
+    return count_refusals(deaf);
+}
+
+/* Looks that take two periods may leave the loop at the same moment of a picture each time, never in a rest. Whether
+ * this pair is left out, so that the loop idles until the next one. */
+static bool write_needs_time(void) {
+    exposure.misses = is_due() ? exposure.misses + 1 : 0;
+    if (exposure.misses <= MISSES) {
+        return false;
+    }
+    exposure.misses = 0;
+    return true;
 }
 
 static void look(plr_session *session, const capture_pair *there) {
@@ -190,9 +269,9 @@ static void look(plr_session *session, const capture_pair *there) {
     (void)plr_session_look(session, &pair);
 }
 
-void sensors_step(plr_session *session) {
+const char *sensors_step(plr_session *session) {
     if (!started) {
-        return;
+        return NULL;
     }
     const uint64_t late_ns = moments_now_ns() - CAMERA_LATE_NS; /* before a pair is looked for */
     const capture_pair *there = capture_take(&pairs);
@@ -201,10 +280,11 @@ void sensors_step(plr_session *session) {
         follow_light(there);
     }
     const bool apart = exposure.apart;
-    expose(); /* now, for a look takes long */
-    if (there != NULL && apart) {
+    const char *trouble = expose(); /* now, for a look takes long */
+    if (there != NULL && (apart || write_needs_time())) {
         ++exposure.left_out;
     } else if (there != NULL) {
         look(session, there);
     }
+    return trouble;
 }

@@ -26,15 +26,20 @@ static struct {
     readings *readings;
     capture *pairs;
     bool pattern, running;
+    bool read_out; /* the picture that was triggered last */
     unsigned frame, feeds, starts, out_of_step, triggers;
     const char *dead_camera, *dead_imu, *dead_clock;
     uint32_t strip[STRIP_WORDS];
     uint64_t readout_ns, exposed_ns;
-    double light; /* grey levels over those of EXPOSURE_FIRST's */
+    uint64_t look_ns, write_ns; /* what one takes */
+    double light;               /* grey levels over those of EXPOSURE_FIRST's */
     /* of exposure, left and right: of this picture, ..., as written */
     unsigned rows[2][WRITTEN + 1];
-    unsigned writes, deaf; /* the right camera does not take the next so many */
-    unsigned apart;        /* pictures whose exposures differed, and their times */
+    unsigned writes, answered[2];
+    unsigned deaf[2]; /* the left and right camera do not take the next so many */
+    unsigned dull[2]; /* before them they take so many */
+    unsigned mute[2]; /* and of these they do not answer so many, but take them */
+    unsigned apart;   /* pictures whose exposures differed, and their times */
     uint64_t apart_ns[APART];
 } world;
 
@@ -72,6 +77,8 @@ static void trigger(void) {
     const uint64_t exposure_ns = world.rows[0][0] * UINT64_C(32000);
     const uint64_t middle_ns = world.next_picture_ns + exposure_ns / 2;
     world.triggers++;
+    world.read_out = false;
+    world.exposed_ns = 0;
     if (world.rows[0][0] != world.rows[1][0]) {
         TEST_ASSERT_TRUE(world.apart < APART);
         world.apart_ns[world.apart++] = middle_ns;
@@ -94,15 +101,15 @@ static void play(uint64_t until_ns) {
             readings_put(world.readings, &one);
             world.next_reading_ns += 5 * MS;
         }
-        if (!world.running || world.now_ns < world.next_picture_ns)
+        if (!world.running)
             continue;
-        if (world.exposed_ns == 0)
-            trigger();
-        if (world.exposed_ns == 0)
-            world.next_picture_ns += 50 * MS;
-        else if (world.now_ns >= world.exposed_ns + world.readout_ns) {
+        if (world.exposed_ns != 0 && world.now_ns >= world.exposed_ns + world.readout_ns) {
             read_out();
             world.exposed_ns = 0;
+            world.read_out = true;
+        }
+        if (world.now_ns >= world.next_picture_ns) {
+            trigger();
             world.next_picture_ns += 50 * MS;
         }
     }
@@ -134,11 +141,13 @@ const char *imu_start(readings *queue_of_loop) {
 const char *camera_start(capture *into, bool pattern, uint16_t exposure_rows) {
     for (unsigned i = 0; i <= WRITTEN; i++)
         world.rows[0][i] = world.rows[1][i] = exposure_rows;
+    world.answered[0] = world.answered[1] = exposure_rows;
     world.pairs = into;
     world.pattern = pattern;
     world.running = world.dead_camera == NULL;
     world.next_picture_ns = world.now_ns + 3 * MS;
     world.exposed_ns = 0;
+    world.read_out = false;
     world.starts++;
     return world.dead_camera;
 }
@@ -147,26 +156,36 @@ void camera_stop(void) {
     world.running = false;
 }
 
+/* As drivers/stm32h7_camera.c, whose counter has 0.1 ms: from 31 ms on where no last strip came. */
 bool camera_rests(void) {
-    return world.exposed_ns == 0 && world.next_picture_ns > world.now_ns + 4 * MS;
+    const uint64_t since_ns = world.now_ns + 50 * MS - world.next_picture_ns;
+    return since_ns > 0 && (world.read_out || since_ns >= 31 * MS) && since_ns < 46 * MS;
 }
 
-/* The last picture of the left camera was exposed as it was last told: only then does its grey level tell
- * something. */
-bool camera_expose(uint16_t rows) {
-    const unsigned before = world.triggers;
-    if (world.rows[0][WRITTEN] != rows)
+uint32_t camera_triggered(void) {
+    return world.triggers;
+}
+
+/* A change comes while the last picture of the left camera was exposed as it was last told: only then does its grey
+ * level tell something. */
+bool camera_expose(camera_side side, uint16_t rows) {
+    if (world.answered[0] == world.answered[1] && world.rows[0][WRITTEN] != rows)
         TEST_ASSERT_EQUAL_UINT(world.rows[0][WRITTEN], world.rows[0][0]);
     world.writes++;
-    world.rows[0][WRITTEN] = rows;
-    play(world.now_ns + MS / 2);
-    if (world.deaf > 0) {
-        world.deaf--;
+    const bool takes_it = world.deaf[side] == 0 || world.dull[side] > 0;
+    if (takes_it)
+        world.rows[side][WRITTEN] = rows;
+    if (world.dull[side] > 0)
+        world.dull[side]--;
+    else if (!takes_it)
+        world.deaf[side]--;
+    play(world.now_ns + world.write_ns);
+    if (world.mute[side] > 0) {
+        world.mute[side]--;
         return false;
     }
-    world.rows[1][WRITTEN] = rows;
-    play(world.now_ns + MS / 2);
-    return world.triggers == before;
+    world.answered[side] = takes_it ? rows : world.answered[side];
+    return takes_it;
 }
 
 /* --- the tests --- */
@@ -176,19 +195,34 @@ void setUp(void) {
     world.now_ns = 1000 * MS;
     world.light = 0.75;
     world.readout_ns = 10 * MS;
+    world.write_ns = MS / 2;
     memset(&queue, 0, sizeof queue);
     started = false;
     desk_clear(1);
 }
 
+static const plr_eyes_calls *looks;
+
+static plr_status look_slowly(plr_eyes *e, const plr_picture_pair *pair, bool place_known,
+                              plr_frame *frame) {
+    const plr_status status = looks->look(e, pair, place_known, frame);
+    play(world.now_ns + world.look_ns);
+    return status;
+}
+
 /* Pictures of this size are those of HEADER's camera, which has no others. */
 static void begin_session(void) {
+    static plr_eyes_calls slow;
     plr_message header = inertial_header();
     header.as.header.image_width_px = WIDTH;
     header.as.header.image_height_px = HEIGHT;
     options.eyes = firmware_eyes();
     options.output |= sensors_output;
     TEST_ASSERT_NOT_NULL(options.eyes);
+    looks = options.eyes->calls;
+    slow = *looks;
+    slow.look = look_slowly;
+    options.eyes->calls = &slow;
     desk_begin();
     desk_send(header);
     desk_run();
@@ -301,12 +335,25 @@ static void assert_exposed_alike(void) {
             TEST_ASSERT_TRUE(m.as.stereo.t_ns != world.apart_ns[i]);
 }
 
-static void run_for(uint64_t ns) {
+/* Returns how often something was told; `told` is the last of it. */
+static const char *told;
+
+static unsigned run_for(uint64_t ns) {
     const uint64_t end_ns = world.now_ns + ns;
+    unsigned count = 0;
     while (world.now_ns < end_ns) {
-        sensors_step(&session);
+        const char *trouble = sensors_step(&session);
+        told = trouble != NULL ? trouble : told;
+        count += trouble != NULL;
         play(world.now_ns + MS);
     }
+    return count;
+}
+
+/* By half and more, and both cameras alike. */
+static void assert_brighter(void) {
+    TEST_ASSERT_TRUE(world.rows[0][0] > EXPOSURE_FIRST * 3 / 2);
+    TEST_ASSERT_EQUAL_UINT(world.rows[0][0], world.rows[1][0]);
 }
 
 /* camera_expose above holds that each change comes from a picture with the exposure before it. */
@@ -317,9 +364,26 @@ static void test_a_change_of_light_is_followed_by_one_change_of_exposure_that_is
     TEST_ASSERT_EQUAL_UINT(0, world.writes);
     world.light = 0.4;
     run_for(1000 * MS);
-    TEST_ASSERT_EQUAL_UINT(1, world.writes);
-    TEST_ASSERT_TRUE(world.rows[0][0] > EXPOSURE_FIRST * 3 / 2);
-    TEST_ASSERT_EQUAL_UINT(world.rows[0][0], world.rows[1][0]);
+    assert_brighter();
+    TEST_ASSERT_EQUAL_UINT(2, world.writes); /* one of each camera */
+}
+
+/* A pair is ready some 15 ms after its trigger, and the loop idles again when a look of it ends. Looks of two periods
+ * leave each second picture out, and end in it. */
+static void test_the_exposure_is_written_however_long_a_look_takes(void) {
+    for (uint64_t look_ms = 0; look_ms <= 110; look_ms += 2) {
+        setUp();
+        world.look_ns = look_ms * MS;
+        TEST_ASSERT_NULL(sensors_start());
+        begin_session();
+        run_for(500 * MS);
+        world.light = 0.4;
+        run_for(1500 * MS);
+        assert_brighter();
+        TEST_ASSERT_EQUAL_UINT(2, world.writes);
+        TEST_ASSERT_EQUAL_UINT(0, world.apart);
+        TEST_ASSERT_TRUE(exposure.left_out <= (look_ms > 90));
+    }
 }
 
 static void test_no_picture_begins_between_the_two_cameras_exposures(void) {
@@ -335,22 +399,99 @@ static void test_no_picture_begins_between_the_two_cameras_exposures(void) {
             play(world.now_ns + (uint64_t)(rng_uniform(&chance, 0, 60) * (double)MS));
         }
     }
-    TEST_ASSERT_TRUE(world.writes > 20);
+    TEST_ASSERT_TRUE(world.writes > 40);
     TEST_ASSERT_EQUAL_UINT(0, world.apart);
     TEST_ASSERT_EQUAL_UINT32(0, exposure.left_out);
 }
 
-static void test_pairs_with_two_exposures_are_left_out_until_both_cameras_have_taken_it(void) {
+/* A camera that does not take some exposures costs no pair: the other goes on with what both had. */
+static void test_cameras_stay_alike_while_one_does_not_take_an_exposure(void) {
+    for (unsigned side = 0; side < 2; side++) {
+        setUp();
+        TEST_ASSERT_NULL(sensors_start());
+        begin_session();
+        run_for(500 * MS);
+        const uint32_t before = eyes.totals.pairs;
+        world.light = 0.4;
+        world.deaf[side] = REFUSALS - 1;
+        TEST_ASSERT_EQUAL_UINT(0, run_for(2000 * MS));
+        TEST_ASSERT_EQUAL_UINT(0, world.deaf[side]);
+        assert_brighter();
+        TEST_ASSERT_EQUAL_UINT(0, world.apart);
+        TEST_ASSERT_EQUAL_UINT32(0, exposure.left_out);
+        TEST_ASSERT_TRUE(eyes.totals.pairs >= before + 39);
+    }
+}
+
+static void test_a_camera_that_never_takes_an_exposure_again_is_told_once_and_pairs_go_on(void) {
+    for (unsigned side = 0; side < 2; side++) {
+        setUp();
+        TEST_ASSERT_NULL(sensors_start());
+        begin_session();
+        run_for(500 * MS);
+        const uint32_t before = eyes.totals.pairs;
+        world.light = 0.4;
+        world.deaf[side] = UINT32_MAX;
+        TEST_ASSERT_EQUAL_UINT(1, run_for(30000 * MS));
+        TEST_ASSERT_NOT_NULL(strstr(told, side == 0 ? "left" : "right"));
+        TEST_ASSERT_TRUE(strlen(told) <= PLR_WIRE_MAX_TEXT);
+        TEST_ASSERT_TRUE(world.writes < 30); /* it is asked more rarely then, but for ever */
+        TEST_ASSERT_TRUE(eyes.totals.pairs >= before + 599);
+        TEST_ASSERT_EQUAL_UINT(0, world.apart);
+        world.deaf[side] = 0;
+        TEST_ASSERT_EQUAL_UINT(0, run_for(12000 * MS));
+        assert_brighter();
+    }
+}
+
+/* The light is as before when the camera that has it all the same is told again. */
+static void test_a_camera_that_took_what_it_did_not_answer_is_told_what_both_have(void) {
+    TEST_ASSERT_NULL(sensors_start());
+    begin_session();
+    run_for(500 * MS);
+    world.light = 0.4;
+    world.mute[1] = 1;
+    while (world.mute[1] > 0)
+        run_for(MS);
+    TEST_ASSERT_TRUE(world.rows[0][WRITTEN] != world.rows[1][WRITTEN]);
+    world.light = 0.75;
+    run_for(500 * MS);
+    TEST_ASSERT_EQUAL_UINT(EXPOSURE_FIRST, world.rows[0][0]);
+    TEST_ASSERT_EQUAL_UINT(EXPOSURE_FIRST, world.rows[1][0]);
+}
+
+/* The right camera takes none, and the left one does not take the old one back. */
+static void test_pairs_with_two_exposures_are_left_out_until_both_cameras_have_the_same(void) {
     TEST_ASSERT_NULL(sensors_start());
     begin_session();
     run_for(500 * MS);
     const uint32_t before = eyes.totals.pairs;
     world.light = 0.4;
-    world.deaf = 5;
-    run_for(2000 * MS);
-    TEST_ASSERT_EQUAL_UINT(6, world.writes);
+    world.deaf[1] = 20;
+    world.dull[0] = 1;
+    world.deaf[0] = 3;
+    run_for(4000 * MS);
+    TEST_ASSERT_EQUAL_UINT(0, world.deaf[0]);
     TEST_ASSERT_TRUE(world.apart > 0);
     TEST_ASSERT_TRUE(exposure.left_out >= world.apart);
-    TEST_ASSERT_TRUE(eyes.totals.pairs > before + 20);
+    TEST_ASSERT_TRUE(eyes.totals.pairs > before + 40);
+    TEST_ASSERT_FALSE(exposure.apart);
+    assert_exposed_alike();
+}
+
+/* As a bus whose clock is held: a picture has the left camera's new exposure before it takes the old one back. */
+static void test_pairs_of_an_attempt_that_a_picture_begins_in_are_left_out(void) {
+    TEST_ASSERT_NULL(sensors_start());
+    begin_session();
+    run_for(500 * MS);
+    const uint32_t before = eyes.totals.pairs;
+    world.light = 0.4;
+    world.write_ns = 20 * MS;
+    world.deaf[1] = UINT32_MAX;
+    run_for(30000 * MS);
+    TEST_ASSERT_TRUE(world.apart > 0);
+    TEST_ASSERT_TRUE(exposure.left_out >= world.apart);
+    TEST_ASSERT_TRUE(exposure.left_out < 50);
+    TEST_ASSERT_TRUE(eyes.totals.pairs > before + 540);
     assert_exposed_alike();
 }

@@ -69,8 +69,8 @@ enum {
     TRIGGER_HZ = 10000,   /* what TIM4 counts */
     TRIGGER_PERIOD = 500, /* 50 ms: 20 pictures a second */
     TRIGGER_PULSE = 1,
-    /* Of that period: 10 ms exposed and 20 read out at most, and then rest. Both sensors take an exposure in 2 ms,
-     * and a bus that hangs is given up 32 ms later, still before the next rest. */
+    /* Of that period: 10 ms exposed and 20 read out at most. Rest begins with the last strip; where none comes,
+     * for a picture was left out or cut, it begins then. A sensor takes an exposure in 1 ms. */
     REST_BEGINS = 310,
     EXPOSE_UNTIL = 460,
     PWM_1 = 6 << 4 | 1 << 3,
@@ -82,6 +82,8 @@ enum {
 
 static volatile uint32_t strips[CAPTURE_BANKS][MOST_STRIP_WORDS] DMA_MEMORY;
 static capture *volatile pairs; /* 0: the interrupts leave pictures alone */
+static volatile uint32_t triggered;
+static volatile bool read_out; /* all strips of the picture that was triggered last are there */
 static uint64_t latest_ticks;
 
 /* --- time --- */
@@ -158,6 +160,8 @@ static void arm(void) {
 /* The pin EXPOSURE rises with the timer's update; what is exposed is read out at the earliest a row later. */
 void camera_trigger_isr(void) {
     TIM4_SR = 0;
+    read_out = false;
+    ++triggered;
     if (pairs != 0) {
         arm();
     }
@@ -176,6 +180,7 @@ void camera_strip_isr(void) {
     DMA1_LIFCR = DMA_FLAGS_0;
     if (full && pairs != 0) {
         capture_strip(pairs, strips[capture_bank(pairs)], written_now);
+        read_out = pairs->filling == 0;
     }
 }
 
@@ -220,17 +225,23 @@ void camera_stop(void) {
     TIM4_CR1 = 0;
     TIM4_DIER = 0;
     pairs = 0;
+    read_out = false;
     DCMI_CR = DCMI_SETTINGS;
     (void)stream_stops();
     compiler_barrier(); /* it is the caller's again */
 }
 
+/* The counter first: `read_out` is then of the same picture. At 0 the trigger's interrupt may still be to come. */
 bool camera_rests(void) {
     const uint32_t since_trigger = TIM4_CNT;
-    return since_trigger >= REST_BEGINS && since_trigger < EXPOSE_UNTIL;
+    return since_trigger > 0 && (read_out || since_trigger >= REST_BEGINS) &&
+           since_trigger < EXPOSE_UNTIL;
 }
 
-bool camera_expose(uint16_t rows) {
-    return mt9v034_expose(LEFT, rows, stm32h7_i2c_write) &&
-           mt9v034_expose(RIGHT, rows, stm32h7_i2c_write) && TIM4_CNT >= REST_BEGINS;
+uint32_t camera_triggered(void) {
+    return triggered;
+}
+
+bool camera_expose(camera_side side, uint16_t rows) {
+    return mt9v034_expose(side == CAMERA_LEFT ? LEFT : RIGHT, rows, stm32h7_i2c_write);
 }
