@@ -77,9 +77,13 @@ static void test_readings_that_no_float32_holds_are_refused_and_change_nothing(v
     static const struct {
         double value;
         plr_status status;
-    } bad[] = {{1e39, PLR_E_RANGE},    {-1e39, PLR_E_RANGE},         {3.41e38, PLR_E_RANGE},
-               {-1e308, PLR_E_RANGE},  {HUGE_VAL, PLR_E_NOT_FINITE}, {-HUGE_VAL, PLR_E_NOT_FINITE},
-               {NAN, PLR_E_NOT_FINITE}};
+    } bad[] = {{1e39, PLR_E_RANGE},
+               {-1e39, PLR_E_RANGE},
+               {3.41e38, PLR_E_RANGE},
+               {-1e308, PLR_E_RANGE},
+               {HUGE_VAL, PLR_E_NOT_FINITE},
+               {-HUGE_VAL, PLR_E_NOT_FINITE},
+               {(double)NAN, PLR_E_NOT_FINITE}};
     const inertial_result alone = inertial_result_of(&inertial_plain);
     desk_clear(1);
     desk_begin();
