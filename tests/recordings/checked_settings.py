@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What does `pelorus check` write, and does another tree's write the same?
 
-usage: settings.py OUT.json [--against OTHER.json] [--only TEXT] [--bin build/bin]
+usage: checked_settings.py OUT.json [--against OTHER.json] [--only TEXT] [--bin build/bin]
 
 The recordings are those of judge.py, and simulated drives by twists and by an IMU, some of them
 with a clock or a baseline that is off. Each is checked from bare settings. OUT.json has for each
