@@ -350,6 +350,12 @@ static unsigned run_for(uint64_t ns) {
     return count;
 }
 
+static void begin_and_settle(void) {
+    TEST_ASSERT_NULL(sensors_start());
+    begin_session();
+    run_for(500 * MS);
+}
+
 /* By half and more, and both cameras alike. */
 static void assert_brighter(void) {
     TEST_ASSERT_TRUE(world.rows[0][0] > EXPOSURE_FIRST * 3 / 2);
@@ -358,9 +364,7 @@ static void assert_brighter(void) {
 
 /* camera_expose above holds that each change comes from a picture with the exposure before it. */
 static void test_a_change_of_light_is_followed_by_one_change_of_exposure_that_is_waited_for(void) {
-    TEST_ASSERT_NULL(sensors_start());
-    begin_session();
-    run_for(500 * MS);
+    begin_and_settle();
     TEST_ASSERT_EQUAL_UINT(0, world.writes);
     world.light = 0.4;
     run_for(1000 * MS);
@@ -377,9 +381,7 @@ static void test_the_exposure_is_written_however_long_a_look_takes(void) {
         const uint64_t look_ms = looks_ms[i];
         setUp();
         world.look_ns = look_ms * MS;
-        TEST_ASSERT_NULL(sensors_start());
-        begin_session();
-        run_for(500 * MS);
+        begin_and_settle();
         world.light = 0.4;
         run_for(1500 * MS);
         assert_brighter();
@@ -411,9 +413,7 @@ static void test_no_picture_begins_between_the_two_cameras_exposures(void) {
 static void test_cameras_stay_alike_while_one_does_not_take_an_exposure(void) {
     for (unsigned side = 0; side < 2; side++) {
         setUp();
-        TEST_ASSERT_NULL(sensors_start());
-        begin_session();
-        run_for(500 * MS);
+        begin_and_settle();
         const uint32_t before = eyes.totals.pairs;
         world.light = 0.4;
         world.deaf[side] = REFUSALS - 1;
@@ -429,9 +429,7 @@ static void test_cameras_stay_alike_while_one_does_not_take_an_exposure(void) {
 static void test_a_camera_that_never_takes_an_exposure_again_is_told_once_and_pairs_go_on(void) {
     for (unsigned side = 0; side < (PELORUS_SHORT_FORM ? 1 : 2); side++) {
         setUp();
-        TEST_ASSERT_NULL(sensors_start());
-        begin_session();
-        run_for(500 * MS);
+        begin_and_settle();
         const uint32_t before = eyes.totals.pairs;
         world.light = 0.4;
         world.deaf[side] = UINT32_MAX;
@@ -449,9 +447,7 @@ static void test_a_camera_that_never_takes_an_exposure_again_is_told_once_and_pa
 
 /* The light is as before when the camera that has it all the same is told again. */
 static void test_a_camera_that_took_what_it_did_not_answer_is_told_what_both_have(void) {
-    TEST_ASSERT_NULL(sensors_start());
-    begin_session();
-    run_for(500 * MS);
+    begin_and_settle();
     world.light = 0.4;
     world.mute[1] = 1;
     while (world.mute[1] > 0)
@@ -465,9 +461,7 @@ static void test_a_camera_that_took_what_it_did_not_answer_is_told_what_both_hav
 
 /* The right camera takes none, and the left one does not take the old one back. */
 static void test_pairs_with_two_exposures_are_left_out_until_both_cameras_have_the_same(void) {
-    TEST_ASSERT_NULL(sensors_start());
-    begin_session();
-    run_for(500 * MS);
+    begin_and_settle();
     const uint32_t before = eyes.totals.pairs;
     world.light = 0.4;
     world.deaf[1] = 20;
@@ -484,9 +478,7 @@ static void test_pairs_with_two_exposures_are_left_out_until_both_cameras_have_t
 
 /* As a bus whose clock is held: a picture has the left camera's new exposure before it takes the old one back. */
 static void test_pairs_of_an_attempt_that_a_picture_begins_in_are_left_out(void) {
-    TEST_ASSERT_NULL(sensors_start());
-    begin_session();
-    run_for(500 * MS);
+    begin_and_settle();
     const uint32_t before = eyes.totals.pairs;
     world.light = 0.4;
     world.write_ns = 20 * MS;

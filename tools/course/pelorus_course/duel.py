@@ -36,9 +36,6 @@ class Duel:
         """Returns 2 ln of the likelihood ratio of so many wins against a coin."""
         return of_share(self.share, self.independent, 0.5)
 
-    def clearly_won(self, ratio: float, share: float, z: float) -> bool:
-        return self.challenger < ratio * self.given and self.share >= share and self.z >= z
-
 
 def duel(given: Floats, challenger: Floats, lag: int) -> Duel:
     """Compares errors of the same frames under both hypotheses; both must have them."""
